@@ -86,20 +86,28 @@ def is_own_fault(error: BaseException) -> bool:
 
 
 @contextmanager
-def blaming_file(problem: Callable[[Exception], str], where: str = "") -> Iterator[None]:
-    """Context that turns a reader's exceptions into `InputError`: `where`, then the text `problem`(error).
+def blaming_file(problem: Callable[[Exception], str]) -> Iterator[None]:
+    """Context that turns a reader's exceptions into `InputError` with the text `problem`(error).
 
-    Faults of the program stay what they are. `where` names file and key.
+    Faults of the program stay what they are.
     """
-    begin = f"{where}: " if where else ""
     try:
         yield
-    except FfrobotError as error:
-        raise InputError(f"{begin}{error}") from error.__cause__
+    except FfrobotError:
+        raise
     except Exception as error:
         if is_own_fault(error):
             raise
-        raise InputError(f"{begin}{problem(error)}") from error
+        raise InputError(problem(error)) from error
+
+
+@contextmanager
+def naming(where: object) -> Iterator[None]:
+    """Context that puts `where` (file and key) before the messages of `InputError`."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from error.__cause__
 
 
 ELSEWHERE = {

@@ -36,10 +36,9 @@ from .link_records.families import FAMILIES
 from .link_records.link import BeamLink, Link, SolidLink
 from .link_records.measured import read_measured
 from .link_source import LinkSource, LinkTable, link_path
-from .modal_body import ModalBody, StressPoint
-from .modal_body.damping import damping_ratio
+from .modal_body import ModalBody
 from .modal_body.lumped_masses import lumps
-from .modal_body.measured import as_computed, with_measured
+from .modal_body.measured import as_computed, damping_ratio, with_measured
 from .modal_body_file import FORMAT, read_modal_body, write_modal_body
 
 Progress = Callable[[str], None]
@@ -92,7 +91,10 @@ def make_link(
         body = ffrobot.make_link("arm.toml").body
         body.frequency  # (n,) in Hz
     """
-    start, source = time.perf_counter(), _source(link)
+    start = time.perf_counter()
+    if isinstance(link, Mapping):
+        link = LinkTable(plain(link), Path("<link made in Python>"))
+    source: LinkSource = link if isinstance(link, LinkTable) else Path(link)
     checked = read_link(source)
     digest, beside = input_hash(checked), _beside(source)
     cached = _cached(checked)
@@ -103,12 +105,6 @@ def make_link(
         on_first(lambda: check_output(path, FORMAT))
     earlier = [] if force else [path, *beside]
     return _compute(checked, link_path(source), path, earlier, start=start, progress=progress, force=force)
-
-
-def _source(link: AnyPath | LinkTable | Mapping[str, Any]) -> LinkSource:
-    if isinstance(link, Mapping):
-        return LinkTable(plain(link), Path("<link made in Python>"))
-    return link if isinstance(link, LinkTable) else Path(link)
 
 
 def cached_modal_body(source: LinkSource, progress: Progress | None = None) -> LinkOutcome:
@@ -135,7 +131,7 @@ def computed_modal_body(source: LinkSource) -> ModalBody:
     link, path = read_link(source), link_path(source)
     compute = _computation(link, path, remesh=False)
     with of_file(path), ending_at_once():
-        body: ModalBody = compute(link, path, _silent)
+        body: ModalBody = compute(link, path, lambda _: None)
     return body
 
 
@@ -165,10 +161,17 @@ def _compute(
         write_modal_body(path, body, in_cache=path == cached)
 
     def from_same_modes() -> bool:
-        body = None if force else _with_same_modes(link, earlier, cached.parent)
-        if body is not None:
-            write(body)
-        return body is not None
+        """Whether one of `earlier` or the cache has the same modes: then the file is written from it."""
+        wanted = modes_hash(link)
+        for one in () if force else (*earlier, *filter(is_own, sorted(cached.parent.glob(f"{wanted}-*.h5")))):
+            same = None
+            with suppress(FfrobotError):
+                body = read_modal_body(one)
+                same = restated(body, link) if body.modes_hash == wanted else None
+            if same is not None:
+                write(same)
+                return True
+        return False
 
     if on_first(from_same_modes):
         return LinkOutcome(path, read_modal_body(path), True, time.perf_counter() - start, "modes")
@@ -177,7 +180,7 @@ def _compute(
 
     def make() -> ModalBody:
         with _ONE_AT_A_TIME, of_file(source_path), ending_at_once():
-            body = with_measured(compute(link, source_path, progress or _silent), link)
+            body = with_measured(compute(link, source_path, progress or (lambda _: None)), link)
         from ..mesh.compat import assembly
         from .modal_body.krylov_schur import eigensolver
 
@@ -192,17 +195,6 @@ def _compute(
         body = make()
         on_first(lambda: write(body))
     return LinkOutcome(path, body, True, time.perf_counter() - start, "mesh" if meshed else "")
-
-
-def _with_same_modes(link: Link, earlier: Sequence[Path], cache: Path) -> ModalBody | None:
-    """The modal body of `link` from one with the same modes, among `earlier` files and the cache."""
-    wanted = modes_hash(link)
-    for path in (*earlier, *filter(is_own, sorted(cache.glob(f"{wanted}-*.h5")))):
-        with suppress(FfrobotError):
-            body = read_modal_body(path)
-            if body.modes_hash == wanted and (same := restated(body, link)) is not None:
-                return same
-    return None
 
 
 def _computation(link: Link, source_path: Path, remesh: bool) -> Callable[..., ModalBody]:
@@ -247,10 +239,6 @@ def is_outdated(path: Path) -> bool:
     return False
 
 
-def _silent(_: str) -> None:
-    pass
-
-
 _ONE_AT_A_TIME = RLock()  # gmsh and PETSc know one thread
 _AFTER_THE_MODES = ("name", "damping", "stress", "measured")
 
@@ -285,11 +273,20 @@ def _digest(record: Mapping[str, Any]) -> str:
 
 def restated(body: ModalBody, link: Link) -> ModalBody | None:
     """Derive the modal body of `link` from one with the same modes; None where it lacks any requested data."""
-    body = as_computed(body)
-    stress = _stresses(body, link)
-    if stress is None or (link.stress.surface and body.surface_static is None):
+    body, loads = as_computed(body), body.stress_loads
+    if isinstance(link, BeamLink):  # stresses follow from its stations
+        from .beam.stress import beam_stresses, stress_loads  # loads SciPy
+
+        attached = lumps(link.interface, body.interfaces)
+        of_modes = np.diag(body.stiffness), body.family, attached, body.residual, body.interfaces
+        points, loads = beam_stresses(link, body.stations, *of_modes), stress_loads(link, body.interfaces)
+    else:  # which needs its mesh for them
+        known = {tuple(point.position): point for point in body.stress.values() if point.static is not None}
+        if not known.keys() >= set(link.stress.points.values()):
+            return None
+        points = {name: known[position] for name, position in link.stress.points.items()}
+    if link.stress.surface and body.surface_static is None:
         return None
-    points, loads = stress
     same = replace(
         body,
         name=link.name,
@@ -302,20 +299,3 @@ def restated(body: ModalBody, link: Link) -> ModalBody | None:
         input_hash=input_hash(link),
     )
     return with_measured(same, link)
-
-
-def _stresses(body: ModalBody, link: Link) -> tuple[dict[str, StressPoint], tuple[str, ...]] | None:
-    """Of a beam they follow from its stations; of a solid, which needs its mesh for them, those there are.
-
-    With the names of the loads whose static stresses they have.
-    """
-    if isinstance(link, BeamLink):
-        from .beam.stress import beam_stresses, stress_loads  # loads SciPy
-
-        attached = lumps(link.interface, body.interfaces)
-        of_modes = np.diag(body.stiffness), body.family, attached, body.residual, body.interfaces
-        return beam_stresses(link, body.stations, *of_modes), stress_loads(link, body.interfaces)
-    known = {tuple(point.position): point for point in body.stress.values() if point.static is not None}
-    if not known.keys() >= set(link.stress.points.values()):
-        return None
-    return {name: known[position] for name, position in link.stress.points.items()}, body.stress_loads

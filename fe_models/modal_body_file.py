@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import h5py
 import numpy as np
 
-from ..common.arrays import Array, Integers, NDArray
+from ..common.arrays import Array, NDArray
 from ..common.checksum import MARK, METHOD, sealed
 from ..common.errors import InputError
 from ..common.files import AnyPath, write_atomically
@@ -84,9 +84,9 @@ def read_modal_body(path: AnyPath) -> ModalBody:
         ffrobot.read_modal_body("arm.h5").mass  # kg
     """
     path = Path(path)
-    found = _found(path)
+    kept = _kept_of(path)
     read_files.add(path)
-    return found if found is not None else _read(path, _body)
+    return kept or _read(path, _body)
 
 
 _kept = dict[Path, tuple[object, ModalBody]]()
@@ -96,11 +96,11 @@ read_files = set[Path]()
 
 def keep_modal_body(path: Path) -> None:
     """Read a file for this process and those forked from it: none of them reads it again until it changes."""
-    if _found(path) is None:
+    if _kept_of(path) is None:
         _kept[path] = _state(path), _read(path, _body)
 
 
-def _found(path: Path) -> ModalBody | None:
+def _kept_of(path: Path) -> ModalBody | None:
     state, body = _kept.get(path, (None, None))
     return body if state is not None and state == _state(path) else None
 
@@ -166,40 +166,36 @@ def _body(file: h5py.File) -> ModalBody:
         if known[name].default is MISSING or group in file:
             values[name] = record(**_arrays(file[group], record))
     values |= {name: _texts(file, dataset) for name, dataset in _NAMES.items() if dataset in file}
-    if "modes/residual" in file:
-        values["residual"] = _whole_numbers(file["modes/residual"])
+    if (residual := file.get("modes/residual")) is not None:
+        if residual.dtype.kind not in "iu":
+            raise InputError(f"{residual.name}: expected whole numbers", residual.dtype)
+        values["residual"] = np.asarray(read(residual), dtype=np.int64)
     if "damping_of" in file["modes"].attrs:
         values["damping_of"] = _text(file["modes"].attrs["damping_of"])
     values |= {name: _text(file.attrs.get(name, "")) for name in _OPTIONAL}
-    points = file.get("stress/points", {})
+    points, matrices = file.get("stress/points", {}), dict[str, Array]()
+
+    def collect(name: str, item: h5py.Dataset | h5py.Group) -> None:
+        if isinstance(item, h5py.Dataset):
+            matrices[name] = _array(file["geometric_stiffness"], name)
+
+    if "geometric_stiffness" in file:
+        file["geometric_stiffness"].visititems(collect)
     return ModalBody(
         **values,
         family=_texts(file, "modes/family"),
-        geometric_stiffness=_geometric_stiffness(file),
-        interfaces={name: _interface(group) for name, group in file["interfaces"].items()},
+        geometric_stiffness=matrices,
+        interfaces={
+            name: Interface(**_arrays(group, Interface) | {"coupling": _text(group.attrs.get("coupling", ""))})
+            for name, group in file["interfaces"].items()
+        },
         stress={name: StressPoint(**_arrays(points[name], StressPoint)) for name in points},
     )
-
-
-def _interface(group: h5py.Group) -> Interface:
-    return Interface(**_arrays(group, Interface) | {"coupling": _text(group.attrs.get("coupling", ""))})
 
 
 def _arrays(group: h5py.Group, record: type[DataclassInstance]) -> dict[str, Any]:
     """The datasets of `group` that are fields of `record`; those without default must be there."""
     return {name: _numbers(item) for name, item in fields_in(group, record).items()}
-
-
-def _geometric_stiffness(file: h5py.File) -> dict[str, Array]:
-    matrices: dict[str, Array] = {}
-
-    def collect(name: str, item: h5py.Dataset | h5py.Group) -> None:
-        if isinstance(item, h5py.Dataset):
-            matrices[name] = np.asarray(_numbers(item), dtype=np.float64)
-
-    if "geometric_stiffness" in file:
-        file["geometric_stiffness"].visititems(collect)
-    return matrices
 
 
 def _array(group: h5py.Group, name: str) -> Array:
@@ -217,12 +213,6 @@ def _numbers(item: object) -> NDArray[Any]:
         raise InputError(f"{name}: expected numbers up to {LARGEST:g}", f"{worst:.3g}")
     whole = isinstance(item, h5py.Dataset) and item.dtype.kind in "iu"
     return values.astype(np.int64) if whole else values
-
-
-def _whole_numbers(dataset: h5py.Dataset) -> Integers:
-    if dataset.dtype.kind not in "iu":
-        raise InputError(f"{dataset.name}: expected whole numbers", dataset.dtype)
-    return np.asarray(read(dataset), dtype=np.int64)
 
 
 def _text(value: object) -> str:

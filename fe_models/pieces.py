@@ -86,7 +86,6 @@ def _place(x: float, length: float, count: int) -> tuple[int, str]:
 def _piece(
     link: BeamLink, path: Path, k: int, count: int, places: Mapping[str, tuple[int, str]], allowed: Sequence[Family]
 ) -> dict[str, Any]:
-    """The keys of the link file of piece k."""
     record = link.model_dump(mode="json", exclude_none=True)
     length, start = link.geometry.length / count, k * link.geometry.length / count
     families = [family for family in link.families if family in allowed]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
@@ -18,11 +18,10 @@ from scipy.spatial import cKDTree
 
 from ..common.arrays import Integers
 from ..common.errors import InputError
-from .abaqus_deck import Keyword, Sets
-from .abaqus_model import Deck, Instance
+from .abaqus_deck import Deck, Instance, Keyword, Sets
 from .cells import in_gmsh_order
 from .included import number_of
-from .source import PointMass, RawMesh
+from .source import PointMass, RawMesh, left_out
 
 # Corners of the sides S1, S2 … (Abaqus Analysis User's Guide, "Three-dimensional solid element library").
 _SIDES: dict[int, list[tuple[int, ...]]] = {
@@ -68,10 +67,10 @@ class _Assembled:
             for number, (kind, nodes) in instance.scope.solids.items():
                 cells.append((kind, [self._node(name, node, f"element {number}") for node in nodes]))
         same, remarks = self._tied()
-        blocks = list[tuple[str, Integers]]()
-        for kind, run in groupby(cells, key=itemgetter(0)):
-            block = same[np.array([nodes for _, nodes in run], dtype=np.int64)]
-            blocks.append((kind, in_gmsh_order(kind, block)))
+        blocks = [
+            (kind, in_gmsh_order(kind, same[np.array([nodes for _, nodes in run], dtype=np.int64)]))
+            for kind, run in groupby(cells, key=itemgetter(0))
+        ]
         faces = {name: [same[piece] for piece in pieces] for name, pieces in self._faces().items()}
         groups = {name: same[group] for name, group in self._node_sets().items()}
         remarks += self._left_out()
@@ -135,8 +134,7 @@ class _Assembled:
             return
         sets = self.scopes[own].scope.elsets
         for row, place in keyword.rows():
-            side = _SIDE.fullmatch(row[1].upper()) if len(row) > 1 else None
-            if side is None:
+            if (side := _side(row)) is None:
                 continue
             for instance, number, _ in sets.meant(row[0], place):
                 if (instance or own) not in self.scopes:
@@ -224,22 +222,18 @@ class _Assembled:
 
     def _left_out(self) -> Iterator[str]:
         others = Counter(kind for one in self.scopes.values() for kind in one.scope.others.values())
-        if others:
-            listed = ", ".join(f"{count} {kind}" for kind, count in others.items())
-            yield f"elements that are not solids are left out, with their stiffness and mass: {listed}"
+        yield from left_out(others, [f"*{name}" for name, count in self.deck.not_read.items() if count])
         for one in self.scopes.values():
             for keyword in one.scope.faces.values():
-                if strange := [", ".join(row) for row, _ in keyword.rows() if not _is_read(keyword, row)]:
+                # Of nodes, or of sides of solids; sides of shells are faces by their set.
+                of_nodes, combined = keyword.options.get("TYPE", "").upper() == "NODE", "COMBINE" in keyword.options
+                rows = [row for row, _ in keyword.rows() if not of_nodes]
+                if strange := [", ".join(row) for row in rows if combined or not _side(row)]:
                     name = keyword.options["NAME"]
                     yield f'{keyword}: of surface {name} {len(strange)} lines are not read: "{strange[0]}"'
         if self.deck.unused:
             yield f"parts without an instance are left out: {', '.join(sorted(self.deck.unused))}"
-        if unread := [f"*{name}" for name, count in self.deck.not_read.items() if count]:
-            yield f"not read: {', '.join(unread)}"
 
 
-def _is_read(surface: Keyword, row: list[str]) -> bool:
-    """Whether a line of a surface is of nodes, or of sides of solids; sides of shells are faces by their set."""
-    if surface.options.get("TYPE", "ELEMENT").upper() == "NODE":
-        return True
-    return len(row) > 1 and _SIDE.fullmatch(row[1].upper()) is not None and "COMBINE" not in surface.options
+def _side(row: Sequence[str]) -> re.Match[str] | None:
+    return _SIDE.fullmatch(row[1].upper()) if len(row) > 1 else None

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import lru_cache
-from itertools import product
 from types import MappingProxyType
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -100,7 +99,7 @@ _BLOCK = 20_000  # cells integrated at a time
 
 @lru_cache
 def reference_nodes(cell: CellName, degree: int) -> Array:
-    """Return nodes (v, 3) of the reference cell: corners, then middles of edges, faces and (hexahedra) the cell."""
+    """Return nodes (v, 3) of the reference cell, edges of 1: corners, middles of edges, faces and the hexahedron."""
     shape = CELLS[cell]
     if degree == 1:
         return shape.corners
@@ -111,32 +110,28 @@ def reference_nodes(cell: CellName, degree: int) -> Array:
 
 
 @lru_cache
-def _exponents(cell: CellName, degree: int) -> list[tuple[int, ...]]:
-    """The monomials X^a Y^b Z^c that the shape functions combine."""
-    all_of = product(range(degree + 1), repeat=3)
-    return [powers for powers in all_of if cell == "hexahedron" or sum(powers) <= degree]
+def _element(cell: CellName, degree: int) -> tuple[Any, Integers]:
+    """Basix's Lagrange element, and which of its nodes gmsh's nodes are."""
+    import basix
 
-
-def _monomials(cell: CellName, degree: int, X: Array) -> Array:
-    """(q, m) at `X` (q, 3)."""
-    return np.stack([np.prod(X**powers, axis=1) for powers in _exponents(cell, degree)], axis=1)
-
-
-def _of_nodes(cell: CellName, degree: int) -> Array:
-    """(m, v) coefficients of the monomials in the shape function of each node."""
-    return as_floats(np.linalg.inv(_monomials(cell, degree, reference_nodes(cell, degree))))
+    variant = basix.LagrangeVariant.equispaced
+    element = basix.create_element(basix.ElementFamily.P, getattr(basix.CellType, cell), degree, variant)
+    return element, np.linalg.norm(reference_nodes(cell, degree)[:, None] - element.points, axis=2).argmin(axis=1)
 
 
 def jacobians(nodes: Array, cell: CellName, degree: int, X: Array) -> Array:
-    """Return derivatives (c, q, 3, 3) ∂x_i/∂X_d of cells with `nodes` (c, v, 3), at `X` (q, 3)."""
-    slopes = _monomial_slopes(cell, degree, X) @ _of_nodes(cell, degree)  # (3, q, v)
-    return np.einsum("dqv,cvi->cqid", slopes, nodes, optimize=True)
+    """Return derivatives (c, q, 3, 3) ∂x_i/∂X_d of cells with `nodes` (c, v, 3), m, at reference points X (q, 3)."""
+    element, order = _element(cell, degree)
+    return np.einsum("dqv,cvi->cqid", element.tabulate(1, X)[1:, :, order, 0], nodes, optimize=True)
 
 
 def volume_and_center(nodes: Array, cell: CellName, degree: int) -> tuple[float, Array]:
-    """Volume, and its center (3,), of cells with `nodes` (c, v, 3), warped or curved: exact but for round-off."""
-    X, weights = _gauss(cell, 2 * degree)
-    values = _monomials(cell, degree, X) @ _of_nodes(cell, degree)  # (q, v)
+    """Volume, m³, and its center (3,), m, of cells with `nodes` (c, v, 3), warped or curved, but for round-off."""
+    import basix
+
+    element, order = _element(cell, degree)
+    X, weights = basix.make_quadrature(element.cell_type, 4 * degree - 1)
+    values = element.tabulate(0, X)[0, :, order, 0].T  # (q, v)
     volume, moment = 0.0, np.zeros(3)
     for some in np.array_split(nodes, len(nodes) // _BLOCK + 1):
         parts = np.linalg.det(jacobians(some, cell, degree, X)) * weights
@@ -145,21 +140,8 @@ def volume_and_center(nodes: Array, cell: CellName, degree: int) -> tuple[float,
     return volume, as_floats(moment / volume)
 
 
-def _gauss(cell: CellName, count: int) -> tuple[Array, Array]:
-    """Gauss points (q, 3) and weights (q,): `count` along each axis of the cube, which collapses to the tetrahedron.
-
-    x = u, y = v (1 − u), z = w (1 − u)(1 − v): the determinant of that map takes two degrees (Stroud 1971).
-    """
-    of_line, weights = np.polynomial.legendre.leggauss(count)  # type: ignore[no-untyped-call, unused-ignore]
-    u, v, w = (X := np.stack(np.meshgrid(*[(of_line + 1) / 2] * 3, indexing="ij"))).reshape(3, -1)
-    W = np.einsum("i,j,k->ijk", *[weights / 2] * 3).ravel()
-    if cell == "hexahedron":
-        return X.reshape(3, -1).T, W
-    return np.stack([u, v * (1 - u), w * (1 - u) * (1 - v)], axis=1), W * (1 - u) ** 2 * (1 - v)
-
-
 def cell_quality(corners: Array, cell: CellName) -> Array:
-    """Return quality (c,) of cells with `corners` (c, v, 3): 1 for regular tetrahedra and cubes, 0 for flat cells.
+    """Return quality (c,) of cells with `corners` (c, v, 3), m: 1 for regular tetrahedra and cubes, 0 for flat cells.
 
     Volume of a tetrahedron relative to that of the regular one with the same mean square edge; smallest determinant of
     a hexahedron's Jacobian relative to the product of its edges.
@@ -172,13 +154,3 @@ def cell_quality(corners: Array, cell: CellName) -> Array:
         return np.sqrt(2) * determinants.min(axis=1) / np.maximum(squares.mean(axis=1), 1e-200) ** 1.5
     sides = np.prod(np.linalg.norm(J, axis=2), axis=2)
     return np.min(determinants / np.maximum(sides, 1e-300), axis=1)
-
-
-def _monomial_slopes(cell: CellName, degree: int, X: Array) -> Array:
-    slopes = np.zeros((3, len(X), len(_exponents(cell, degree))))
-    for k, powers in enumerate(_exponents(cell, degree)):
-        for d in range(3):
-            lowered = np.array(powers)
-            lowered[d] = max(lowered[d] - 1, 0)
-            slopes[d, :, k] = powers[d] * np.prod(X**lowered, axis=1)
-    return slopes

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NoReturn
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,7 +12,7 @@ from scipy.spatial import cKDTree
 from ..common.arrays import Array, Booleans
 from ..common.errors import InputError
 from .cells import KUHN, SLIVER, cell_quality, jacobians, reference_nodes, volume_and_center
-from .part_mesh import PartMesh, boundary_facets, facet_geometry, facet_keys
+from .part_mesh import PartMesh, boundary_facets, facet_geometry, facet_keys, show
 from .records import SolidGeometry
 
 # Smallest determinant of a curved cell's Jacobian relative to its largest.
@@ -31,7 +30,7 @@ _ON_FACET = {3: np.array([0.4, 0.35, 0.25]), 4: np.array([0.65 * 0.58, 0.35 * 0.
 _LENGTHS = (0.2, 5.0)
 
 
-def check_size(size: float, volume: float, where: str) -> float:
+def check_size(size: float, volume: float) -> float:
     """Return the number of tetrahedra of `size` (m) in `volume` (m³). Raises `InputError` above `MOST_CELLS`."""
     cubes = volume / size**3
     side = cubes ** (1 / 3) * size
@@ -39,39 +38,43 @@ def check_size(size: float, volume: float, where: str) -> float:
     check_count(
         count,
         f"{size:.3g} m for the volume of a cube of {side:.3g} m",
-        where,
         ' Is it drawn in another unit (unit = "mm")?',
     )
     return count
 
 
-def check_count(count: float, given: str, where: str, hint: str = "") -> None:
+def check_count(count: float, given: str, hint: str = "") -> None:
     """Raise `InputError` for a mesh of more than `MOST_CELLS` cells; `given` explains the number."""
     if count > MOST_CELLS:
         raise InputError(
-            f"{where}: expected a mesh.size that fits the part",
+            "expected a mesh.size that fits the part",
             f"{given}: about {count:.2g} cells, {MOST_CELLS:.0e} at most.{hint}",
         )
 
 
-def check_shape(part: PartMesh, geometry: SolidGeometry, where: str) -> None:
+def check_shape(part: PartMesh, geometry: SolidGeometry) -> None:
     """Raise `InputError` for a placed part without thickness, or of a length so wrong that the unit must be."""
     extent = np.ptp(part.points[part.corners.ravel()], axis=0)
     if extent.min() <= 1e-9 * extent.max():
         axis = "xyz"[int(np.argmin(extent))]
-        raise InputError(
-            f"{where}: expected a part of some thickness", f"all nodes in one plane: zero elements along {axis}"
-        )
+        raise InputError("expected a part of some thickness", f"all nodes in one plane: zero elements along {axis}")
     ratio = extent[0] / geometry.length
     if _LENGTHS[0] < ratio < _LENGTHS[1]:
         return
     others = {unit: ratio * metres / METRES[geometry.unit] for unit, metres in METRES.items() if unit != geometry.unit}
     likely = [unit for unit, corrected in others.items() if 0.8 < corrected < 1.25]
     hint = f': looks like {_NAMES[likely[0]]}: geometry.unit = "{likely[0]}"' if likely else ""
-    raise InputError(f"{where}: expected a part {geometry.length:g} m long", f"{extent[0]:g} m along x{hint}")
+    raise InputError(f"expected a part {geometry.length:g} m long", f"{extent[0]:g} m along x{hint}")
 
 
-def check_neighbours(part: PartMesh, where: str) -> None:
+def check_sound(part: PartMesh) -> None:
+    """Raise `InputError` for bad cells, cells in one another, and a part in pieces."""
+    check_quality(part)
+    check_neighbours(part)
+    check_connected(part)
+
+
+def check_neighbours(part: PartMesh) -> None:
     """Raise `InputError` unless cells, right-handed as they are, lie on either side of the facets that they share.
 
     Else three cells or more have a facet, or two on the same side of it: some lie in one another.
@@ -85,13 +88,11 @@ def check_neighbours(part: PartMesh, where: str) -> None:
     sided = keys + (after < before)[:, 0]
     _, number, count = np.unique(sided, return_inverse=True, return_counts=True)
     bad = count[number.reshape(-1)] > 1
-    if np.any(bad):
-        cells = np.zeros(len(part.cells), dtype=bool)
-        cells[np.flatnonzero(bad) // len(part.shape.facets)] = True
-        _reject_cells(part, cells, "overlapping elements", "elements side by side", where)
+    bad_cells = np.any(bad.reshape(len(part.cells), -1), axis=1)
+    _refuse(part, bad_cells, "overlapping elements", "elements side by side")
 
 
-def check_connected(part: PartMesh, where: str) -> None:
+def check_connected(part: PartMesh) -> None:
     """Raise `InputError` unless the cells are connected by their faces."""
     _, number = np.unique(facet_keys(part.cell_facets, len(part.points)), return_inverse=True)
     cell = np.repeat(np.arange(len(part.cells)), len(part.shape.facets))
@@ -100,17 +101,16 @@ def check_connected(part: PartMesh, where: str) -> None:
     if count == 1:
         return
     middles = part.points[part.corners].mean(axis=1)
-    listed = [
-        f"{np.sum(piece == k)} elements around {_show(middles[piece == k].mean(axis=0))}" for k in range(min(count, 4))
-    ]
+    pieces = [piece == k for k in range(min(count, 4))]
+    listed = [f"{np.sum(own)} elements around {show(middles[own].mean(axis=0))}" for own in pieces]
     more = f", and {count - 4} more" if count > 4 else ""
     raise InputError(
-        f"{where}: expected one connected part",
+        "expected one connected part",
         f"{count}: {'; '.join(listed)}{more}. Parts that touch must share their nodes",
     )
 
 
-def check_boundary(part: PartMesh, where: str) -> None:
+def check_boundary(part: PartMesh) -> None:
     """Raise `InputError` where the part lies on both sides of a facet that only one cell has.
 
     There elements overlap, or nodes at one place are not joined, which is a crack.
@@ -138,9 +138,9 @@ def check_boundary(part: PartMesh, where: str) -> None:
         share = np.linalg.solve(edges, (probes[probe] - x[of, 0])[..., None])[..., 0]  # of the corners but the first
         inside[probe[(share.min(axis=1, initial=1.0) > _INSIDE) & (share.sum(axis=1) < 1 - _INSIDE)]] = True
     if np.any(inside):
-        listed = ", ".join(_show(place) for place in on_facets[inside][:3])
+        listed = ", ".join(show(place) for place in on_facets[inside][:3])
         raise InputError(
-            f"{where}: expected elements side by side",
+            "expected elements side by side",
             f"{np.sum(inside)} of their free sides inside others, e.g. at {listed} m: elements overlap, or nodes at"
             " one place are not one",
         )
@@ -157,17 +157,15 @@ def oriented(part: PartMesh) -> PartMesh:
     return part
 
 
-def check_quality(part: PartMesh, where: str) -> None:
+def check_quality(part: PartMesh) -> None:
     """Raise `InputError`, with how many and where, for cells that are inverted or flat."""
     determinants = _determinants(part)
     largest = np.abs(determinants).max(axis=1)
     inverted = determinants.min(axis=1) <= 1e-6 * largest
     # A flat cell's determinant has no sign to speak of.
     flat = cell_quality(part.points[part.corners], part.cell) < SLIVER
-    if np.any(inverted & ~flat):
-        _reject_cells(part, inverted & ~flat, "inverted elements", "elements with their nodes in order", where)
-    if np.any(flat):
-        _reject_cells(part, flat, "flat elements (slivers)", "elements of some volume", where)
+    _refuse(part, inverted & ~flat, "inverted elements", "elements with their nodes in order")
+    _refuse(part, flat, "flat elements (slivers)", "elements of some volume")
 
 
 def straightened(part: PartMesh) -> PartMesh:
@@ -192,7 +190,7 @@ def straightened(part: PartMesh) -> PartMesh:
     return part.moved(points)
 
 
-def check_volume(part: PartMesh, curved: PartMesh, where: str) -> None:
+def check_volume(part: PartMesh, curved: PartMesh) -> None:
     """Raise `InputError` unless `straightened` kept the volume that gmsh's `curved` part has.
 
     Else cells are too long for a thin curved wall, and the link would not have its mass.
@@ -203,7 +201,7 @@ def check_volume(part: PartMesh, curved: PartMesh, where: str) -> None:
     change = after / volume - 1
     if abs(change) > _VOLUME:
         raise InputError(
-            f"{where}: expected a mesh.size at which cells follow curved faces",
+            "expected a mesh.size at which cells follow curved faces",
             f"a volume {100 * change:+.1f} % off where cells that fold are straightened: cells are too long for a thin"
             " curved wall",
         )
@@ -215,11 +213,8 @@ def _determinants(part: PartMesh) -> Array:
     return np.linalg.det(jacobians(part.points[part.cells], part.cell, part.degree, at))
 
 
-def _reject_cells(part: PartMesh, bad: Booleans, what: str, expected: str, where: str) -> NoReturn:
-    middles = part.points[part.corners[bad]].mean(axis=1)
-    listed = ", ".join(_show(middle) for middle in middles[:3])
-    raise InputError(f"{where}: expected {expected}", f"{np.sum(bad)} {what} of {len(bad)}, e.g. at {listed} m")
-
-
-def _show(point: Array) -> str:
-    return f"({', '.join(f'{value:.4g}' for value in point)})"
+def _refuse(part: PartMesh, bad: Booleans, what: str, expected: str) -> None:
+    """Raise `InputError` for the cells that are `bad` (c,), with how many and where; none is fine."""
+    if np.any(bad):
+        listed = ", ".join(map(show, part.points[part.corners[bad]].mean(axis=1)[:3]))
+        raise InputError(f"expected {expected}", f"{np.sum(bad)} {what} of {len(bad)}, e.g. at {listed} m")

@@ -7,21 +7,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from ..common.arrays import Array, Integers, NDArray
+from ..common.arrays import Array, Integers
 from ..common.errors import InputError, did_you_mean, quoted
 from ..common.structs import struct
-from .part_mesh import PartMesh, boundary_facets, facet_geometry, facet_keys
+from .part_mesh import PartMesh, boundary_facets, facet_geometry, facet_keys, show
 from .records import Outlines, PartTables, PlaceRecord, RectangleSection, SolidGeometry
 from .source import Source
-
-Choice = Integers
 
 # A facet lies in a plane when its corners are closer to it than this, relative to the length of the link: files carry
 # as few as five digits.
@@ -54,9 +51,16 @@ class PartBoundary:
     @cached_property
     def smooth_faces(self) -> list[SmoothFace]:
         """Facets joined across edges that are not sharp, largest face first."""
-        number = _joined(self)
-        faces = [SmoothFace.of(self, np.flatnonzero(number == k)) for k in range(number.max(initial=-1) + 1)]
-        return sorted(faces, key=lambda face: -face.area)
+        count, sides = self.facets.shape
+        pairs = np.stack([self.facets, np.roll(self.facets, -1, axis=1)], axis=2).reshape(-1, 2)
+        pairs.sort(axis=1)
+        order = np.lexsort(pairs.T)
+        same = np.all(pairs[order][1:] == pairs[order][:-1], axis=1)
+        first, second = order[:-1][same] // sides, order[1:][same] // sides
+        smooth = np.einsum("fi,fi->f", self.normal[first], self.normal[second]) > _SMOOTH
+        links = (np.ones(smooth.sum(), dtype=np.int8), (first[smooth], second[smooth]))
+        faces, number = connected_components(sp.coo_matrix(links, shape=(count, count)), directed=False)
+        return sorted((SmoothFace.of(self, np.flatnonzero(number == k)) for k in range(faces)), key=lambda of: -of.area)
 
 
 @struct
@@ -67,14 +71,14 @@ class SmoothFace:
     place. `axis` is None where there is none.
     """
 
-    facets: Choice
+    facets: Integers
     center: Array
     area: float
     normal: Array
     axis: Array | None
 
     @classmethod
-    def of(cls, boundary: PartBoundary, facets: Choice) -> SmoothFace:
+    def of(cls, boundary: PartBoundary, facets: Integers) -> SmoothFace:
         """Make a face from its facets."""
         weights = boundary.area[facets] / boundary.area[facets].sum()
         normals = boundary.normal[facets]
@@ -105,9 +109,8 @@ class SmoothFace:
         return float(np.min(np.hypot(above, np.maximum(aside - reach, 0.0))))
 
     def __str__(self) -> str:
-        facing = "axis" if self.axis is not None else "normal"
-        direction = self.axis if self.axis is not None else self.normal
-        return f"center {_show(self.center)} m, {facing} {_show(np.round(direction, 2))}, {self.area:.4g} m²"
+        facing, direction = ("normal", self.normal) if self.axis is None else ("axis", self.axis)
+        return f"center {show(self.center)} m, {facing} {show(np.round(direction, 2))}, {self.area:.4g} m²"
 
 
 def named_faces(source: Source, tables: PartTables) -> PartMesh:
@@ -115,26 +118,25 @@ def named_faces(source: Source, tables: PartTables) -> PartMesh:
 
     Raises `InputError`, with the faces that the part has, if a face is missing or two overlap.
     """
-    part, geometry, path = source.part, tables.geometry, tables.path
+    part, geometry = source.part, tables.geometry
     boundary = PartBoundary.of(part)
-    chosen: dict[str, Choice] = {}
+    chosen: dict[str, Integers] = {}
     by_name = {item.name: item for item in tables.places}
     for name, x, outward in (("root", 0.0, -1.0), ("tip", geometry.length, 1.0)):
         table = by_name.get(name)
         if table is None or (table.group is None and table.position is None):
-            chosen[name] = _end_face(boundary, name, x, outward, geometry.length, path)
+            chosen[name] = _end_face(boundary, name, x, outward, geometry.length)
     for table in tables.places:
         if table.group is not None:
-            chosen[table.name] = _group(source, boundary, table.group, f"{path}: interface.group of {table.name}")
+            chosen[table.name] = _group(source, boundary, table.group, f"interface.group of {table.name}")
         elif isinstance(table.position, tuple):
-            chosen[table.name] = _nearest(boundary, table, path)
+            chosen[table.name] = _nearest(boundary, table)
     if tables.outlines is not None:
-        chosen |= _patch_beds(boundary, geometry, tables.outlines, path)
-    return _tagged(part, boundary, chosen, path)
+        chosen |= _patch_beds(boundary, geometry, tables.outlines)
+    return _tagged(part, boundary, chosen)
 
 
-def _end_face(boundary: PartBoundary, name: str, x: float, outward: float, length: float, path: Path) -> Choice:
-    """The facets in the plane at `x` that face away from the link."""
+def _end_face(boundary: PartBoundary, name: str, x: float, outward: float, length: float) -> Integers:
     corners = boundary.points[boundary.facets, 0]
     flat = np.all(np.abs(corners - x) <= IN_PLANE * length, axis=1)
     facets = np.flatnonzero(flat & (outward * boundary.normal[:, 0] > 0.99))
@@ -142,25 +144,25 @@ def _end_face(boundary: PartBoundary, name: str, x: float, outward: float, lengt
         return facets
     sign = "-" if outward < 0 else "+"
     expected = f"a plane face at x = {x:g} with the outward normal {sign}x, or an [[interface]] table of that name"
-    _reject(f"{path}: {name}", expected, "none", boundary)
+    _reject(name, expected, "none", boundary)
 
 
-def _group(source: Source, boundary: PartBoundary, group: str, where: str) -> Choice:
+def _group(source: Source, boundary: PartBoundary, group: str, where: str) -> Integers:
     """The boundary facets of a group of facets, or those whose corners are all in a group of points."""
     if group in source.facet_groups:
         wanted = facet_keys(source.facet_groups[group], len(boundary.points))
         own = facet_keys(boundary.facets, len(boundary.points))
         outside = int(np.sum(~np.isin(wanted, own) | np.any(source.facet_groups[group] < 0, axis=1)))
         if outside:
-            facets = (
-                f"{outside} of the {wanted.size} facets of the group elsewhere: not connected to the volume, or inside"
+            raise InputError(
+                f"{where}: expected a face on the boundary of the part",
+                f"{outside} of the {wanted.size} facets of the group elsewhere: not connected to the volume, or inside",
             )
-            raise InputError(f"{where}: expected a face on the boundary of the part", facets)
         return np.flatnonzero(np.isin(own, wanted))
     if group in source.point_groups:
-        found_facets = np.flatnonzero(np.all(np.isin(boundary.facets, source.point_groups[group]), axis=1))
-        if found_facets.size:
-            return found_facets
+        facets = np.flatnonzero(np.all(np.isin(boundary.facets, source.point_groups[group]), axis=1))
+        if facets.size:
+            return facets
         number = source.point_groups[group].size
         raise InputError(f"{where}: expected nodes that make up a face", f"{number} nodes and no facet among them")
     known = sorted({*source.facet_groups, *source.point_groups})
@@ -170,18 +172,15 @@ def _group(source: Source, boundary: PartBoundary, group: str, where: str) -> Ch
     )
 
 
-def _nearest(boundary: PartBoundary, table: PlaceRecord, path: Path) -> Choice:
-    """The smooth face nearest to the table's position among those that face along its normal."""
+def _nearest(boundary: PartBoundary, table: PlaceRecord) -> Integers:
     position, normal = np.array(table.position, dtype=np.float64), np.array(table.normal, dtype=np.float64)
-    where = f"{path}: interface.position of {table.name}"
+    where = f"interface.position of {table.name}"
     magnitude = np.linalg.norm(normal)
     if magnitude == 0:
-        raise InputError(f"{path}: interface.normal of {table.name}: expected a direction", table.normal)
+        raise InputError(f"interface.normal of {table.name}: expected a direction", table.normal)
     facing = [face for face in boundary.smooth_faces if face.faces_along(normal / magnitude)]
     distances = np.array([face.distance(boundary, position) for face in facing])
-    wanted = (
-        f"a face near {_show(position)} m with the outward normal (of a bore: the axis) {_show(normal / magnitude)}"
-    )
+    wanted = f"a face near {show(position)} m with the outward normal (of a bore: the axis) {show(normal / magnitude)}"
     if not facing:
         _reject(where, wanted, "none", boundary)
     best = int(np.argmin(distances))
@@ -195,13 +194,13 @@ def _nearest(boundary: PartBoundary, table: PlaceRecord, path: Path) -> Choice:
     return facing[best].facets
 
 
-def _patch_beds(boundary: PartBoundary, geometry: SolidGeometry, outlines: Outlines, path: Path) -> dict[str, Choice]:
+def _patch_beds(boundary: PartBoundary, geometry: SolidGeometry, outlines: Outlines) -> dict[str, Integers]:
     """The facets under each patch, whose area is that of the patch."""
     assert isinstance(geometry.section, RectangleSection)
     slack = IN_PLANE * geometry.length
     corners = boundary.points[boundary.facets]
     across = np.all(np.abs(corners[..., 2]) <= outlines.width / 2 + slack, axis=1)
-    beds: dict[str, Choice] = {}
+    beds: dict[str, Integers] = {}
     for name, y in (("top", geometry.section.height / 2), ("bottom", -geometry.section.height / 2)):
         if outlines.faces not in (name, "both"):
             continue
@@ -212,14 +211,14 @@ def _patch_beds(boundary: PartBoundary, geometry: SolidGeometry, outlines: Outli
             area, expected = boundary.area[bed].sum(), (end - begin) * outlines.width
             if abs(area - expected) > 1e-6 * expected:
                 raise InputError(
-                    f"{path}: surface_patch: expected {expected:.6g} m² of free surface under patch {k + 1} ({name})",
+                    f"surface_patch: expected {expected:.6g} m² of free surface under patch {k + 1} ({name})",
                     f"{area:.6g} m²",
                 )
             beds[f"patch/{k}/{name}"] = bed
     return beds
 
 
-def _tagged(part: PartMesh, boundary: PartBoundary, chosen: dict[str, Choice], path: Path) -> PartMesh:
+def _tagged(part: PartMesh, boundary: PartBoundary, chosen: dict[str, Integers]) -> PartMesh:
     """One tag for each face; names that chose the same facets share one."""
     tag = np.zeros(len(boundary.facets), dtype=np.int32)
     faces: dict[str, int] = {}
@@ -230,26 +229,11 @@ def _tagged(part: PartMesh, boundary: PartBoundary, chosen: dict[str, Choice], p
             continue
         if met.any():
             others = quoted(other for other, number in faces.items() if number in met)
-            raise InputError(f"{path}: interface {name}: expected faces that do not overlap", f"it to meet {others}")
+            raise InputError(f"interface {name}: expected faces that do not overlap", f"it to meet {others}")
         faces[name] = int(tag.max(initial=0)) + 1
         tag[facets] = faces[name]
     on_faces = np.flatnonzero(tag)
     return replace(part, facets=boundary.facets[on_faces], facet_tag=tag[on_faces], faces=faces)
-
-
-def _joined(boundary: PartBoundary) -> NDArray[np.int32]:
-    """(b,) number of the smooth face of each facet."""
-    facets, sides = boundary.facets, boundary.facets.shape[1]
-    pairs = np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2)
-    pairs.sort(axis=1)
-    owner = np.repeat(np.arange(len(facets)), sides)
-    order = np.lexsort(pairs.T)
-    same = np.all(pairs[order][1:] == pairs[order][:-1], axis=1)
-    first, second = owner[order][:-1][same], owner[order][1:][same]
-    smooth = np.einsum("fi,fi->f", boundary.normal[first], boundary.normal[second]) > _SMOOTH
-    links = (np.ones(smooth.sum(), dtype=np.int8), (first[smooth], second[smooth]))
-    _, number = connected_components(sp.coo_matrix(links, shape=(len(facets), len(facets))), directed=False)
-    return number
 
 
 def _reject(where: str, expected: str, given: str, boundary: PartBoundary) -> NoReturn:
@@ -257,8 +241,3 @@ def _reject(where: str, expected: str, given: str, boundary: PartBoundary) -> No
     listed = "".join(f"\n  {face}" for face in faces[:_LISTED])
     more = f"\n  and {len(faces) - _LISTED} smaller ones" if len(faces) > _LISTED else ""
     raise InputError(f"{where}: expected {expected}", f"{given}. The part's faces:{listed}{more}")
-
-
-def _show(vector: Array) -> str:
-    # Below a micrometer, or in a unit vector, there is nothing to tell; adding zero turns −0 into 0.
-    return f"({', '.join(f'{value:.4g}' for value in np.round(vector, 6) + 0.0)})"

@@ -25,7 +25,7 @@ class Frame:
 
     @classmethod
     def through(cls, points: Array, axes: str, kind: Kind = "rectangular") -> Frame:
-        """Make a frame from `points` (3, 3): origin, a point on the axis `axes[0]`, a point on the side of `axes[1]`.
+        """Make a frame from `points` (3, 3), file's unit: origin, on the axis `axes[0]`, on the side of `axes[1]`.
 
         `axes` are in cyclic order: "xy", "yz" or "zx". Raises `ValueError` for three points on one line.
         """

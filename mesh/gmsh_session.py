@@ -11,12 +11,12 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import product
 from tempfile import TemporaryFile
 
 import gmsh
 import numpy as np
 
-from ..common.arrays import Array, Integers
 from ..common.errors import InputError, is_own_fault
 from .cells import SLIVER, VOLUME_ELEMENTS, cell_quality
 from .records import CIRCLE, GROWTH
@@ -39,13 +39,10 @@ def gmsh_session() -> Iterator[Callable[[], str]]:
         try:
             if threading.current_thread() is threading.main_thread():
                 signal.signal(signal.SIGINT, interrupt)
-            for name, value in (
-                ("General.Terminal", 0),
-                ("General.NumThreads", 1),
-                ("General.AbortOnError", 0),
-                ("Mesh.Algorithm3D", _DELAUNAY),
-            ):
-                gmsh.option.setNumber(name, value)
+            gmsh.option.setNumber("General.Terminal", 0)
+            gmsh.option.setNumber("General.NumThreads", 1)
+            gmsh.option.setNumber("General.AbortOnError", 0)
+            gmsh.option.setNumber("Mesh.Algorithm3D", _DELAUNAY)
             yield printed
         finally:
             gmsh.finalize()
@@ -72,16 +69,15 @@ def volume_and_surface() -> tuple[float, float]:
     return sum(occ.getMass(*e) for e in gmsh.model.getEntities(3)), sum(occ.getMass(*e) for e in faces)
 
 
-def mesh_model(size: float, metres: float, where: str, around: int = CIRCLE) -> None:
+def mesh_model(size: float, metres: float) -> None:
     """Fill the model with tetrahedra of edge length `size`, finer along curved faces, and bend them to these.
 
-    `size` is in the model's unit, which has so many `metres`; `around`: elements on a full circle of a curved face.
-    Raises `InputError`, which begins with `where` (file and key), for a shape that gmsh cannot mesh.
+    `size` is in the model's unit, which has so many `metres`. Raises `InputError` for a shape that gmsh cannot mesh.
     """
     problem: object = None
     for finer, smaller in _ATTEMPTS:
         gmsh.option.setNumber("Mesh.MeshSizeMax", smaller * size)
-        curved = _refine_curved_faces(smaller * size, around * finer)
+        curved = _refine_curved_faces(smaller * size, CIRCLE * finer)
         try:
             gmsh.model.mesh.generate(3)
         except Exception as error:  # gmsh raises nothing more special
@@ -95,9 +91,7 @@ def mesh_model(size: float, metres: float, where: str, around: int = CIRCLE) -> 
                 return
             problem = "some are flat"
         gmsh.model.mesh.clear()
-    raise InputError(
-        f"{where}: expected a shape that elements of {size * metres:g} m can fill", f"that they cannot: {problem}"
-    )
+    raise InputError(f"expected a shape that elements of {size * metres:g} m can fill", f"that they cannot: {problem}")
 
 
 def _has_slivers() -> bool:
@@ -114,7 +108,10 @@ def _refine_curved_faces(size: float, around: int) -> bool:
     by_size: dict[float, list[int]] = {}
     curved = [face for face in gmsh.model.getEntities(2) if gmsh.model.getType(*face) != "Plane"]
     for dim, tag in curved:
-        wanted = float(f"{2 * np.pi / max(_curvature(dim, tag), 1e-12) / around:.6g}")
+        low, high = gmsh.model.getParametrizationBounds(dim, tag)
+        at = low + np.array(list(product((0.1, 0.5, 0.9), repeat=2))) * np.subtract(high, low)
+        curvature = float(np.max(np.abs(gmsh.model.getCurvature(dim, tag, at.ravel()))))
+        wanted = float(f"{2 * np.pi / max(curvature, 1e-12) / around:.6g}")
         if wanted < size:
             by_size.setdefault(wanted, []).append(tag)
     fields = [_growing_field(wanted, size, tags) for wanted, tags in by_size.items()]
@@ -123,17 +120,6 @@ def _refine_curved_faces(size: float, around: int) -> bool:
         gmsh.model.mesh.field.setNumbers(smallest, "FieldsList", fields)
         gmsh.model.mesh.field.setAsBackgroundMesh(smallest)
     return bool(curved)
-
-
-def _curvature(dim: int, tag: int) -> float:
-    """Largest curvature of a face, from a few points on it."""
-    low, high = gmsh.model.getParametrizationBounds(dim, tag)
-    parameters = [
-        (low[0] + a * (high[0] - low[0]), low[1] + b * (high[1] - low[1]))
-        for a in (0.1, 0.5, 0.9)
-        for b in (0.1, 0.5, 0.9)
-    ]
-    return float(np.max(np.abs(gmsh.model.getCurvature(dim, tag, np.ravel(parameters)))))
 
 
 def _growing_field(begin: float, end: float, faces: list[int]) -> int:
@@ -149,37 +135,26 @@ def _growing_field(begin: float, end: float, faces: list[int]) -> int:
 
 
 def own_entities(dim: int = -1) -> list[tuple[int, int]]:
-    """Entities of a dimension, or of all, but for copies that partitions have of elements of others."""
-    entities: list[tuple[int, int]] = gmsh.model.getEntities(dim)
-    return [entity for entity in entities if not gmsh.model.getType(*entity).startswith("Ghost")]
+    """Entities (dimension, tag) of a dimension, or of all, without the copies that partitions have of others."""
+    return [entity for entity in gmsh.model.getEntities(dim) if not gmsh.model.getType(*entity).startswith("Ghost")]
 
 
 def extract_mesh() -> RawMesh:
     """The model's volume elements, with the names of its physical groups; of all volumes where no group has any."""
-    (number, points), blocks = _points(), MeshBlocks()
+    blocks, (tags, coordinates, _) = MeshBlocks(), gmsh.model.mesh.getNodes()
+    number = np.full(int(tags.max(initial=0)) + 1, -1, dtype=np.int64)
+    number[tags.astype(np.int64)] = np.arange(len(tags))
     for dim, entity in [*own_entities(3), *gmsh.model.getEntities(2), *gmsh.model.getEntities(1)]:
-        tags = gmsh.model.getPhysicalGroupsForEntity(dim, entity)
-        names = [gmsh.model.getPhysicalName(dim, tag) or str(tag) for tag in tags]
-        for kind, cells in _elements(dim, entity, number):
+        physical = gmsh.model.getPhysicalGroupsForEntity(dim, entity)
+        names = [gmsh.model.getPhysicalName(dim, tag) or str(tag) for tag in physical]
+        for kind, elements, nodes in zip(*gmsh.model.mesh.getElements(dim, entity), strict=True):
+            cells = number[nodes.astype(np.int64)].reshape(len(elements), -1)
             groups = [(name, np.arange(len(cells))) for name in names]
             corners = cells[:, : gmsh.model.mesh.getElementProperties(kind)[5]]
             if dim == 3:
-                blocks.add_solids(VOLUME_ELEMENTS.get(kind, f"gmsh type {kind}"), cells, groups)
+                blocks.add_solids(VOLUME_ELEMENTS.get(int(kind), f"gmsh type {kind}"), cells, groups)
             elif dim == 2:
                 blocks.add_surfaces(corners, groups)
             else:
                 blocks.lines.append(corners)
-    return blocks.mesh(points, {})
-
-
-def _points() -> tuple[Integers, Array]:
-    """Measure of each node tag of gmsh, and (p, 3) coordinates."""
-    tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    number = np.full(int(tags.max(initial=0)) + 1, -1, dtype=np.int64)
-    number[tags.astype(np.int64)] = np.arange(len(tags))
-    return number, np.asarray(coordinates, dtype=np.float64).reshape(-1, 3)
-
-
-def _elements(dim: int, entity: int, number: Integers) -> Iterator[tuple[int, Integers]]:
-    for kind, tags, nodes in zip(*gmsh.model.mesh.getElements(dim, entity), strict=True):
-        yield int(kind), number[np.asarray(nodes, dtype=np.int64)].reshape(len(tags), -1)
+    return blocks.mesh(np.asarray(coordinates, dtype=np.float64).reshape(-1, 3), {})

@@ -14,10 +14,10 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ..common.arrays import Array, Integers, as_floats
-from ..common.errors import InputError
+from ..common.errors import InputError, naming
 from ..common.structs import struct
 from .cells import volume_and_center
-from .checks import METRES, check_connected, check_neighbours, check_quality, oriented, straightened
+from .checks import METRES, check_sound, oriented, straightened
 from .faces import PartBoundary, SmoothFace
 from .part import is_step, source_of_file
 from .records import SolidMeshRecord
@@ -71,13 +71,19 @@ def inspect_part(file: Path, unit: Unit | None = None) -> Inspection:
     """
     if not file.is_file():
         raise InputError(f"{file}: expected a STEP file or a mesh", "no such file")
-    declared = _declared(file) if is_step(file) else None
+    declared: Unit | None = None
+    if is_step(file):
+        from .gmsh_parts import declared_unit
+
+        units: dict[float, Unit] = {1.0: "mm", 25.4: "in", 1000.0: "m"}
+        millimeters = declared_unit(file.read_text(encoding="latin-1"))
+        if (declared := units.get(millimeters)) is None:
+            raise InputError(f"{file}: expected a part drawn in m, mm or in", f"a unit of {millimeters:g} mm")
     known = unit or declared
-    source = source_of_file(file, SolidMeshRecord(), METRES[known or "m"], str(file))
-    part = straightened(oriented(source.part))
-    check_quality(part, str(file))
-    check_neighbours(part, str(file))
-    check_connected(part, str(file))
+    with naming(file):
+        source = source_of_file(file, SolidMeshRecord(), METRES[known or "m"])
+        part = straightened(oriented(source.part))
+        check_sound(part)
     if known is None:
         known = "mm" if np.ptp(part.points, axis=0).max() > LONGEST else "m"
     part = part.moved(as_floats(METRES[known] * part.points))
@@ -101,16 +107,6 @@ def inspect_part(file: Path, unit: Unit | None = None) -> Inspection:
         remarks=part.remarks,
         masses=[replace(mass, point=as_floats(METRES[known] * mass.point)) for mass in source.masses],
     )
-
-
-def _declared(file: Path) -> Unit | None:
-    from .step import declared_unit
-
-    units: dict[float, Unit] = {1.0: "mm", 25.4: "in", 1000.0: "m"}
-    millimeters = declared_unit(file.read_text(encoding="latin-1"))
-    if millimeters not in units:
-        raise InputError(f"{file}: expected a part drawn in m, mm or in", f"a unit of {millimeters:g} mm")
-    return units[millimeters]
 
 
 def _part_face(boundary: PartBoundary, face: SmoothFace) -> PartFace:

@@ -38,14 +38,14 @@ _AS_VTK = {"hexahedron27": [*range(20), 24, 22, 21, 23, 20, 25, 26]}
 _WHOLE = "MED_NO_PROFILE_INTERNAL"
 
 
-def read_med(path: Path, where: str) -> RawMesh:
-    """The mesh in a MED file; `where` (file and key) begins the message of an error. Groups name regions and faces.
+def read_med(path: Path) -> RawMesh:
+    """The mesh in a MED file. Groups name regions and faces.
 
     Raises `InputError` for none, a damaged one, and what cannot be read: several meshes or steps, grids, polyhedra,
     other coordinates than Cartesian ones.
     """
     with (
-        blaming_file("expected a MED file, found one that cannot be read: {!r}".format, where),
+        blaming_file("expected a MED file, found one that cannot be read: {!r}".format),
         h5py.File(path) as file,
     ):
         return _mesh(file)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..common.arrays import Integers, NDArray
-from ..common.errors import InputError
+from ..common.errors import InputError, blaming_file
 from ..common.libraries import missing
 from .cells import in_gmsh_order
 from .part_reader import read_apart
@@ -43,10 +43,10 @@ _ENDINGS = (".step", ".stp", ".msh", ".inp", ".bdf", ".nas", ".fem", ".dat", ".v
 _MOST_GROUPS = 1000
 
 
-def read_mesh(path: Path, where: str) -> RawMesh:
-    """Read the mesh in `path`, its format given by the ending; `where` (file and key) begins errors' messages."""
+def read_mesh(path: Path) -> RawMesh:
+    """Read the mesh in `path`, its format given by the ending. Raises `InputError` for what is wrong in it."""
     ending = path.suffix.lower()
-    try:
+    with blaming_file("expected a deck that can be read, found one that cannot: {!r}".format):  # one like no other
         if ending == ".inp":
             from .abaqus import read_abaqus
 
@@ -55,22 +55,19 @@ def read_mesh(path: Path, where: str) -> RawMesh:
             from .nastran import read_nastran
 
             return read_nastran(path)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
-    except (ArithmeticError, LookupError, RecursionError, TypeError, ValueError) as error:  # of a deck like no other
-        raise InputError(f"{where}: expected a deck that can be read", f"one that cannot: {error!r}") from None
+    read: Callable[[Path], RawMesh] = read_foreign
     if ending == ".msh":
         from .msh import read_msh
 
-        return read_apart(read_msh, path.stat().st_size, where, path, where)
-    if ending == ".med":
+        read = read_msh
+    elif ending == ".med":
         from .med import read_med
 
-        return read_apart(read_med, path.stat().st_size, where, path, where)
-    return read_apart(read_foreign, path.stat().st_size, where, path, where)
+        read = read_med
+    return read_apart(read, path)
 
 
-def read_foreign(path: Path, where: str) -> RawMesh:
+def read_foreign(path: Path) -> RawMesh:
     """The mesh in `path` by meshio; `InputError` where it cannot read it.
 
     Integer data of cells, groups and sets of the format name regions and faces; so do sets of nodes.
@@ -86,7 +83,7 @@ def read_foreign(path: Path, where: str) -> RawMesh:
         reason = " ".join(reason.replace(str(path), path.name).split())
         if isinstance(error, meshio.ReadError) and path.suffix.lower() not in meshio.extension_to_filetypes:
             reason = f"its ending is not one of {', '.join(_ENDINGS)}: another program has to convert it"
-        raise InputError(f"{where}: expected a mesh that meshio can read", f"that it cannot: {reason}") from None
+        raise InputError("expected a mesh that meshio can read", f"that it cannot: {reason}") from None
     words = " ".join(said.getvalue().replace(str(path), path.name).split())
     return replace(raw, remarks=(f"meshio on {path.name}: {words}",)) if words else raw
 

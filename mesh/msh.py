@@ -23,19 +23,19 @@ from .source import MeshBlocks, RawMesh
 _HEADER = b"$MeshFormat"
 
 
-def read_msh(path: Path, where: str) -> RawMesh:
-    """A mesh in gmsh's format of version 2 or 4; `where` (file and key) begins the messages of `InputError`."""
+def read_msh(path: Path) -> RawMesh:
+    """A mesh in gmsh's format of version 2 or 4. Raises `InputError` for what is wrong in it."""
     content = path.read_bytes().removeprefix(b"\xef\xbb\xbf").lstrip()
     while content.startswith(b"$Comments"):
         content = content.partition(b"$EndComments")[2].lstrip()
     if not content.startswith(_HEADER):
         began = content[:20].decode("ascii", errors="replace").split("\n")[0]
         raise InputError(
-            f"{where}: expected a mesh in gmsh's format, which begins with $MeshFormat",
+            "expected a mesh in gmsh's format, which begins with $MeshFormat",
             f'"{began}" (gmsh\'s scripts are not run: save the mesh that they make)',
         )
     with blaming_file(
-        lambda error: f"expected a mesh in gmsh's format, found a damaged one: {' '.join(str(error).split())}", where
+        lambda error: f"expected a mesh in gmsh's format, found a damaged one: {' '.join(str(error).split())}"
     ):
         version = float(content[len(_HEADER) :].split(maxsplit=1)[0])
         return _Version2(content).mesh() if version < 4 else _by_gmsh(content)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -22,7 +22,7 @@ from ..common.errors import InputError
 from .cells import in_gmsh_order
 from .frames import GLOBAL, Frame, Kind
 from .included import Line, lines_of, number_of, whole_of
-from .source import PointMass, RawMesh
+from .source import PointMass, RawMesh, left_out
 
 _BEGIN = re.compile(r"\s*BEGIN\b[\s,]*(\w*)", re.IGNORECASE)
 _BY_BLANKS = re.compile(r"(GRID|C(?:HEXA|TETRA|PENTA|PYRAM?|ORD[12][RCS]|ONM[12]))\*?(?= )", re.IGNORECASE)
@@ -49,18 +49,14 @@ class Card:
         text = self.text(number)
         return default if default is not None and not text else whole_of(text, str(self))
 
-    def real(self, number: int, default: float = 0.0) -> float:
-        """A number in a field, `default` where it is empty. Raises `InputError` where it is none."""
-        text = self.text(number)
-        return number_of(text, str(self)) if text else default
+    def real(self, number: int) -> float:
+        """A number in a field, 0 where it is empty. Raises `InputError` where it is none."""
+        return number_of(self.text(number) or "0", str(self))
 
 
 @dataclass
 class _Row:
-    """A line of a card; `begin` and `end` are the marks that tell which line goes on with which.
-
-    `is_half` is of lines of 16 columns that end with *: another line has to follow.
-    """
+    """A line of a card; `begin` and `end` are the marks that tell which line goes on with which."""
 
     name: str
     place: str
@@ -68,7 +64,7 @@ class _Row:
     begin: str
     end: str
     follows: bool
-    is_half: bool
+    is_half: bool  # of 16 columns, with * at its end: another line has to follow
 
 
 def cards(path: Path) -> Iterator[Card]:
@@ -261,9 +257,7 @@ class _Deck:
             kind, nodes = _nodes(card)
             cells.setdefault(kind, []).append([self._place(place, node, card) for node in nodes])
             properties.setdefault(kind, []).append(card.whole(1, card.whole(0)))
-        blocks = list[tuple[str, Integers]]()
-        for kind, rows in cells.items():
-            blocks.append((kind, in_gmsh_order(kind, np.array(rows, dtype=np.int64), _AS_VTK)))
+        blocks = [(kind, in_gmsh_order(kind, np.array(rows), _AS_VTK)) for kind, rows in cells.items()]
         owner = np.array([number for of in properties.values() for number in of], dtype=np.int64)
         regions = {str(number): np.flatnonzero(owner == number) for number in np.unique(owner).tolist()}
         faces: dict[str, list[Integers]] = {}
@@ -271,7 +265,10 @@ class _Deck:
             corners = [self._place(place, card.whole(2 + k), card) for k in range(_SHELLS[card.name])]
             faces.setdefault(str(card.whole(1, card.whole(0))), []).append(np.array([corners], dtype=np.int64))
         masses = tuple(map(self._mass, self.masses))
-        return RawMesh(self._points(), blocks, regions, faces, {}, remarks=[*self._left_out()], masses=masses)
+        remarks = [*left_out(self.others, [name for name, count in self.not_read.items() if count])]
+        return RawMesh(
+            self._points(list(self.grids.values())), blocks, regions, faces, {}, remarks=remarks, masses=masses
+        )
 
     def _mass(self, card: Card) -> PointMass:
         """Of CONM1 or CONM2, whose offset is in rectangular axes; with CID = -1 it is the place in the basic ones."""
@@ -292,17 +289,14 @@ class _Deck:
             raise InputError(f"{card}: expected existing grid points", node)
         return place[node]
 
-    def _points(self) -> Array:
-        """(p, 3) of all grid points, in the basic system."""
-        given = np.array([[card.real(k) for k in (2, 3, 4)] for card in self.grids.values()]).reshape(-1, 3)
-        system = np.array([card.whole(1, self.system) for card in self.grids.values()], dtype=np.int64)
+    def _points(self, cards: Sequence[Card]) -> Array:
+        """(p, 3) of grid points, in the basic system."""
+        given = np.array([[card.real(k) for k in (2, 3, 4)] for card in cards]).reshape(-1, 3)
+        system = np.array([card.whole(1, self.system) for card in cards], dtype=np.int64)
         points = np.empty_like(given)
-        first: dict[int, Card] = {}
-        for card, number in zip(self.grids.values(), system.tolist(), strict=True):
-            first.setdefault(number, card)
-        for number, card in first.items():
+        for number, first in zip(*np.unique(system, return_index=True), strict=True):
             own = system == number
-            points[own] = self._frame(number, card).points(given[own])
+            points[own] = self._frame(int(number), cards[first]).points(given[own])
         return points
 
     def _frame(self, number: int, asked: Card) -> Frame:
@@ -319,7 +313,7 @@ class _Deck:
             given = np.array([[card.real(2 + 3 * k + i) for i in range(3)] for k in range(3)])
             points = self._frame(card.whole(1, 0), card).points(given)
         else:
-            points = np.array([self._point(card.whole(begin + 1 + k), card) for k in range(3)])
+            points = np.array([self._point(card.whole(begin + k), card) for k in (1, 2, 3)])
         try:
             frame = Frame.through(points, "zx", _SYSTEMS[card.name[5]])
         except ValueError as error:
@@ -331,16 +325,7 @@ class _Deck:
         """(3,) of a grid point, in the basic system."""
         if number not in self.grids:
             raise InputError(f"{asked}: expected existing grid points", number)
-        card = self.grids[number]
-        given = np.array([[card.real(k) for k in (2, 3, 4)]])
-        return self._frame(card.whole(1, self.system), card).points(given)[0]
-
-    def _left_out(self) -> Iterator[str]:
-        if self.others:
-            listed = ", ".join(f"{count} {name}" for name, count in self.others.items())
-            yield f"elements that are not solids are left out, with their stiffness and mass: {listed}"
-        if unread := [name for name, count in self.not_read.items() if count]:
-            yield f"not read: {', '.join(unread)}"
+        return np.asarray(self._points([self.grids[number]])[0])
 
 
 def _add(cards: dict[int, Card], card: Card, number: int) -> None:

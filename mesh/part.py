@@ -12,16 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ..common.arrays import Array
-from ..common.errors import InputError
+from ..common.errors import InputError, naming
 from .checks import (
     METRES,
     check_boundary,
-    check_connected,
     check_count,
-    check_neighbours,
-    check_quality,
     check_shape,
+    check_sound,
     check_volume,
     oriented,
     straightened,
@@ -31,13 +28,11 @@ from .kept_parts import keep_part, kept_part, kept_path
 from .mesh_files import read_mesh
 from .part_mesh import PartMesh
 from .part_reader import read_apart
-from .records import PartTables, RectangleSection, SolidGeometry, SolidMeshRecord, default_order, default_size
+from .records import PartTables, RectangleSection, SolidGeometry, SolidMeshRecord, default_order, default_size, extents
 from .source import Source, source_from
-from .structured import Divisions, structured_box
+from .structured import structured_box
 
 Progress = Callable[[str], None]
-
-_STEP = (".step", ".stp")
 
 
 def kept_or_new(tables: PartTables, progress: Progress, *, remesh: bool) -> PartMesh:
@@ -58,22 +53,33 @@ def part_mesh(tables: PartTables, progress: Progress) -> PartMesh:
     Raises `InputError`, which names the link file, where the part cannot be read or meshed, its mesh is unsound, or a
     face is not there.
     """
-    geometry, where = tables.geometry, f"{tables.path}: geometry"
-    where = where if geometry.file is None else f"{where}.file: {geometry.file.name}"
-    progress("meshing" if geometry.file is None or is_step(geometry.file) else f"reading {geometry.file.name}")
-    source = _source(tables, where)
-    part = _placed(source.part, geometry) if geometry.file is not None else source.part
-    check_shape(part, geometry, where)
-    part = oriented(part)
-    if geometry.file is None or is_step(geometry.file):
-        curved, part = part, straightened(part)
-        check_volume(part, curved, where)
-    check_quality(part, where)
-    check_neighbours(part, where)
-    check_connected(part, where)
-    if geometry.file is not None and not is_step(geometry.file):
-        check_boundary(part, where)
-    return named_faces(replace(source, part=part), tables)
+    geometry, file, record = tables.geometry, tables.geometry.file, tables.mesh
+    ready = file if file is not None and not is_step(file) else None  # a mesh
+    progress(f"reading {ready.name}" if ready else "meshing")
+    if ready:
+        for key in ("cell", "size", "divisions"):
+            if (given := getattr(record, key)) is not None:
+                raise InputError(f"{tables.path}: mesh.{key}: expected none, since {ready.name} is a mesh", given)
+    with naming(f"{tables.path}: geometry" + (f".file: {file.name}" if file else "")):
+        if file is not None:
+            source = source_of_file(file, record, METRES[geometry.unit])
+            source = replace(source, part=_placed(source.part, geometry))
+        elif _is_meshed(tables):
+            from .gmsh_parts import mesh_shape
+
+            source = mesh_shape(tables)
+        else:
+            source = Source(_box(geometry, record), {}, {})
+        check_shape(source.part, geometry)
+        part = oriented(source.part)
+        if not ready:
+            curved, part = part, straightened(part)
+            check_volume(part, curved)
+        check_sound(part)
+        if ready:
+            check_boundary(part)
+    with naming(tables.path):
+        return named_faces(replace(source, part=part), tables)
 
 
 def _is_meshed(tables: PartTables) -> bool:
@@ -85,60 +91,38 @@ def _is_meshed(tables: PartTables) -> bool:
 
 def is_step(file: Path) -> bool:
     """Whether the file's ending is one of STEP."""
-    return file.suffix.lower() in _STEP
+    return file.suffix.lower() in (".step", ".stp")
 
 
-def _source(tables: PartTables, where: str) -> Source:
-    file, record = tables.geometry.file, tables.mesh
-    if file is None:
-        if not _is_meshed(tables):
-            return Source(_box(tables.geometry, record, where), {}, {})
-        from .shapes import mesh_shape
+def source_of_file(file: Path, record: SolidMeshRecord, metres: float) -> Source:
+    """The mesh of a part's file, made by gmsh of a STEP file, in the file's own numbers, whose unit has `metres`.
 
-        return mesh_shape(tables)
-    if not is_step(file):
-        for key in ("cell", "size", "divisions"):
-            if getattr(record, key) is not None:
-                raise InputError(
-                    f"{tables.path}: mesh.{key}: expected none, since {file.name} is a mesh", getattr(record, key)
-                )
-    return source_of_file(file, record, METRES[tables.geometry.unit], where)
-
-
-def source_of_file(file: Path, record: SolidMeshRecord, metres: float, where: str) -> Source:
-    """The mesh of a part's file, made by gmsh of a STEP file, in the file's own numbers.
-
-    `metres` are those of the file's unit; `where` (file and key) begins the messages. Raises `InputError`.
+    Raises `InputError` where it cannot be read or made.
     """
     if is_step(file):
-        from .step import mesh_step
+        from .gmsh_parts import mesh_step
 
-        arguments = file.absolute(), record, metres, where
-        return read_apart(mesh_step, file.stat().st_size, where, *arguments)
-    return source_from(read_mesh(file.absolute(), where), where)
+        return read_apart(mesh_step, file.absolute(), record, metres)
+    return source_from(read_mesh(file.absolute()))
 
 
-def _box(geometry: SolidGeometry, record: SolidMeshRecord, where: str) -> PartMesh:
+def _box(geometry: SolidGeometry, record: SolidMeshRecord) -> PartMesh:
     """Structured cells; without `divisions`, as many as their size makes."""
     root = geometry.section
     tip = geometry.tip_section or root
     assert isinstance(root, RectangleSection)
     assert isinstance(tip, RectangleSection)
     cell = record.cell or "tetrahedron"
-    ends = (root.height, root.width), (tip.height, tip.width)
-    divisions = record.divisions or _divisions(geometry.length, np.array(ends), record)
+    ends, length, divisions = (extents(root), extents(tip)), geometry.length, record.divisions
+    if divisions is None:
+        height, width = np.mean(ends, axis=0)
+        volume, surface = length * height * width, 2 * (length * (height + width) + height * width)
+        size = record.size or default_size(volume, surface, record.order or default_order("hexahedron"))
+        x, y, z = (max(1, round(extent / size)) for extent in (length, height, width))
+        divisions = x, y, z
     count = prod(divisions) * (1 if cell == "hexahedron" else 6)
-    check_count(count, " × ".join(map(str, divisions)) + " divisions", where)
-    return structured_box(geometry.length, *ends, divisions, cell)
-
-
-def _divisions(length: float, ends: Array, record: SolidMeshRecord) -> Divisions:
-    """Layers along x, y, z that come nearest to the wanted size; `ends` (2, 2) are height and width at root and tip."""
-    height, width = ends.mean(axis=0)
-    volume, surface = length * height * width, 2 * (length * (height + width) + height * width)
-    size = record.size or default_size(volume, surface, record.order or default_order("hexahedron"))
-    x, y, z = (max(1, round(extent / size)) for extent in (length, height, width))
-    return x, y, z
+    check_count(count, " × ".join(map(str, divisions)) + " divisions")
+    return structured_box(length, *ends, divisions, cell)
 
 
 def _placed(part: PartMesh, geometry: SolidGeometry) -> PartMesh:

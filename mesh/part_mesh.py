@@ -49,6 +49,10 @@ class PartMesh:
         facets = self.shape.facets
         return self.corners[:, facets].reshape(-1, facets.shape[1])
 
+    def tags_of(self, region: str) -> tuple[int, ...]:
+        """Return the tags in `cell_tag` of all cells of a volume group."""
+        return self.regions[region], *self.overlaps.get(region, ())
+
     def moved(self, points: Array) -> PartMesh:
         """Return the mesh with other `points` (p, 3), m."""
         return replace(self, points=points)
@@ -82,3 +86,8 @@ def facet_geometry(points: Array, facets: Integers) -> tuple[Array, Array, Array
     size = np.linalg.norm(total, axis=1)
     safe = np.where(area > 0, area, 1.0)
     return moments / safe[:, None], total / np.where(size > 0, size, 1.0)[:, None], area
+
+
+def show(vector: Array) -> str:
+    """Return a point, m, or a direction (3,) in words, without digits below a micrometer."""
+    return f"({', '.join(f'{value:.4g}' for value in np.round(vector, 6) + 0.0)})"  # −0 is 0

@@ -15,6 +15,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
@@ -32,14 +33,14 @@ SECONDS = "FFROBOT_CAD_SECONDS"
 _is_apart = False  # whether this is such a process
 
 
-def read_apart(read: Callable[..., Found], size: int, where: str, *arguments: object) -> Found:
-    """Call `read(*arguments)` in a separate process; a module's function, arguments and result are pickled.
+def read_apart(read: Callable[..., Found], file: Path, *arguments: object) -> Found:
+    """Call `read(file, *arguments)` in a separate process; a module's function, arguments and result are pickled.
 
-    `size` (bytes) is that of the file, by which the time allowed grows. Raises `InputError`, which begins with `where`
-    (file and key), where `read` has raised it, or its process has crashed, or has not ended in the processor time
-    allowed.
+    The time allowed grows with the size of the file. Raises `InputError` where `read` has raised it, or its process has
+    crashed, or has not ended in the processor time allowed.
     """
-    request = pickle.dumps((read, arguments, READING + READING_MB * size / 1e6, where))
+    size = file.stat().st_size if file.is_file() else 0
+    request = pickle.dumps((read, (file, *arguments), READING + READING_MB * size / 1e6))
     environment = environment_without_mpi() | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     with TemporaryDirectory() as folder:
         command = [sys.executable, "-c", f"from {__name__} import main; main()"]
@@ -52,14 +53,14 @@ def read_apart(read: Callable[..., Found], size: int, where: str, *arguments: ob
     if done.returncode == -signal.SIGXCPU:
         seconds = done.stderr.decode().split()[-1]
         raise InputError(
-            f"{where}: expected a part that is read and meshed within {float(seconds):.0f} s of processor time",
+            f"expected a part that is read and meshed within {float(seconds):.0f} s of processor time",
             f"no end: a damaged file, or one that needs longer, which {SECONDS}=SECONDS in the environment allows",
         )
     if done.returncode < 0:
         name = signal.Signals(-done.returncode).name
-        raise InputError(f"{where}: expected an undamaged file; the reader crashed with {name}")
+        raise InputError(f"expected an undamaged file; the reader crashed with {name}")
     reason = [*done.stderr.decode(errors="replace").splitlines(), "no reason"][-2 if done.stderr else -1].strip()
-    raise InputError(f"{where}: expected an undamaged file; the reader reports: {reason}")
+    raise InputError(f"expected an undamaged file; the reader reports: {reason}")
 
 
 def allow(seconds: float) -> None:
@@ -86,7 +87,7 @@ def main() -> None:
     answer = os.fdopen(os.dup(1), "wb")
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)  # OpenCASCADE writes to it
-    read, arguments, seconds, where = pickle.load(sys.stdin.buffer)
+    read, arguments, seconds = pickle.load(sys.stdin.buffer)
     allow(seconds)
     reply: Any
     try:
@@ -94,6 +95,6 @@ def main() -> None:
     except FfrobotError as error:
         reply = error
     except MemoryError:
-        reply = InputError(f"{where}: expected a part that fits into memory, found one that does not")
+        reply = InputError("expected a part that fits into memory, found one that does not")
     answer.write(pickle.dumps(reply))
     answer.flush()

@@ -42,6 +42,16 @@ class CircleSection(Record):
     diameter: Positive
     """Diameter, m."""
 
+    @property
+    def outer(self) -> float:
+        """The diameter, m, as of a tube."""
+        return self.diameter
+
+    @property
+    def inner(self) -> float:
+        """The diameter, m, of the hole: none."""
+        return 0.0
+
 
 class TubeSection(Record):
     """Circular tube."""
@@ -54,6 +64,13 @@ class TubeSection(Record):
 
 
 SectionRecord = Annotated[RectangleSection | CircleSection | TubeSection, Field(discriminator="shape")]
+
+
+def extents(section: SectionRecord | None) -> tuple[float, float]:
+    """Extents of a section along y and z, m."""
+    if isinstance(section, RectangleSection):
+        return section.height, section.width
+    return (section.outer, section.outer) if section else (0.0, 0.0)
 
 
 class Segment(Record):
@@ -186,7 +203,6 @@ class PartTables:
 # Elements along a full circle of a curved face, and along that of a solid bar: there, where a cell has two edges on the
 # circle, it cannot follow it between them. With these a bar lacks 0.03 % of its volume, a part with holes 0.002 %.
 CIRCLE = 12
-BAR = 12
 # How much larger an element may be at unit distance from a curved face.
 GROWTH = 0.4
 

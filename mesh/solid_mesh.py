@@ -7,8 +7,7 @@ The boundary of the distributed mesh: its facets, and the triangles that a pictu
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import field, replace
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -20,10 +19,9 @@ from mpi4py import MPI
 from ..common.arrays import Array, Integers
 from ..common.errors import FfrobotError, InputError
 from ..common.structs import struct
-from .cells import CellName
 from .compat import coordinate_element, create_solid_mesh, geometry_nodes
-from .part import kept_or_new
-from .part_mesh import PartMesh, Tags, facet_keys
+from .part import Progress, kept_or_new
+from .part_mesh import PartMesh, facet_keys
 from .records import PartTables
 
 if TYPE_CHECKING:
@@ -140,7 +138,6 @@ def _gathered(mesh: Mesh, points: Array, triangles: Integers, edges: Integers, c
     return Surface(everything[first], renumbered, borders, mine, cells[local], X.reshape(-1, 3)[local])
 
 
-Progress = Callable[[str], None]
 MeshTags = Any  # dolfinx 0.5 and 0.9 name this class differently
 
 
@@ -149,33 +146,20 @@ class SolidMesh:
     """A solid part as the finite element models take it."""
 
     mesh: Mesh  # of tetrahedra or hexahedra, distributed, without ghost cells; coordinates in m in the link's frame
-    cell: CellName  # shape of the cells
-    cell_tags: MeshTags  # region of every local cell
-    facet_tags: MeshTags  # the facets of the named faces, all of them on the boundary
-    # volume group → tag in `cell_tags`, the largest group first; cells of none have the tag 0
-    regions: Mapping[str, int]
-    # "root", "tip", the interfaces that are faces, "patch/K/top", "patch/K/bottom" → tag in `facet_tags`; two names may
-    # have one tag
-    faces: Mapping[str, int]
+    part: PartMesh  # its names and their tags; without points and cells
+    cell_tags: MeshTags  # region of every local cell, one of `part.tags_of`; 0 of none
+    facet_tags: MeshTags  # the facets of the named faces, all of them on the boundary: `part.faces`
     size: float  # mean extent of the cells along x, in m
     surface: Surface  # what a picture shows
-    # volume group → further tags in `cell_tags`, of its cells that belong to other groups too
-    overlaps: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
-    remarks: tuple[str, ...] = ()  # what the part's file holds and the link does not, a sentence each
-
-    def cells_of(self, region: str) -> tuple[int, ...]:
-        """The tags in `cell_tags` of all cells of a volume group."""
-        return self.regions[region], *self.overlaps.get(region, ())
 
 
-def solid_mesh(
-    tables: PartTables, comm: MPI.Comm = MPI.COMM_WORLD, progress: Progress = lambda _: None, *, remesh: bool = False
-) -> SolidMesh:
-    """Mesh of a solid link, distributed over `comm`, all of whose processes call; see `part_mesh`.
+def solid_mesh(tables: PartTables, progress: Progress = lambda _: None, *, remesh: bool = False) -> SolidMesh:
+    """Mesh of a solid link, distributed over all processes, which all call; see `part_mesh`.
 
     Unless `remesh` a mesh of the same part kept from an earlier run counts. Raises `InputError` on every process.
     """
     outcome: PartMesh | FfrobotError | None = None
+    comm = MPI.COMM_WORLD
     if comm.rank == 0:
         try:
             outcome = kept_or_new(tables, progress, remesh=remesh)
@@ -184,12 +168,17 @@ def solid_mesh(
     failure = comm.bcast(outcome if isinstance(outcome, FfrobotError) else None)
     if failure is not None:
         raise failure
-    return distributed(outcome if isinstance(outcome, PartMesh) else None, comm)
+    return distributed(outcome if isinstance(outcome, PartMesh) else None)
 
 
-def distributed(part: PartMesh | None, comm: MPI.Comm = MPI.COMM_WORLD) -> SolidMesh:
+def distributed(part: PartMesh | None) -> SolidMesh:
     """Distribute the mesh of `part`, given on rank 0 and None elsewhere, over all processes."""
-    known, count, size, keys = comm.bcast(_known_to_all(part) if part is not None else None)
+    comm = MPI.COMM_WORLD
+    shared: tuple[PartMesh, int, float] | None = None
+    if part is not None:
+        without = replace(part, points=part.points[:0], cells=part.cells[:0])
+        shared = without, len(part.points), float(np.mean(np.ptp(part.points[part.corners, 0], axis=1)))
+    known, count, size = comm.bcast(shared)
     own = known if part is None else part
     mesh = create_solid_mesh(comm, known.cell, known.degree, own.cells, own.points)
     local = np.arange(mesh.topology.index_map(3).size_local, dtype=np.int32)
@@ -197,38 +186,16 @@ def distributed(part: PartMesh | None, comm: MPI.Comm = MPI.COMM_WORLD) -> Solid
     if not fewest:
         raise InputError(f"mpirun: expected fewer processes than {comm.size}: some got none of the mesh's elements")
     cell_tag = known.cell_tag[np.asarray(mesh.topology.original_cell_index)[: local.size]]
-    facets, facet_tag = _tagged_facets(mesh, keys, known.facet_tag, count)
-    tags = meshtags(mesh, 3, local, cell_tag.astype(np.int32)), meshtags(mesh, 2, facets, facet_tag)
-    surface = surface_of(mesh)
-    return SolidMesh(
-        mesh,
-        known.cell,
-        *tags,
-        known.regions,
-        known.faces,
-        size=size,
-        surface=surface,
-        overlaps=known.overlaps,
-        remarks=known.remarks,
-    )
+    tags = meshtags(mesh, 3, local, cell_tag.astype(np.int32)), meshtags(mesh, 2, *_tagged_facets(mesh, known, count))
+    return SolidMesh(mesh, known, *tags, size=size, surface=surface_of(mesh))
 
 
-def _known_to_all(part: PartMesh) -> tuple[PartMesh, int, float, Integers]:
-    """The part without cells and points, of which each process has its share; their number, size, and facets."""
-    x, count = part.points[part.corners, 0], len(part.points)
-    size = float(np.mean(x.max(axis=1) - x.min(axis=1)))
-    return replace(part, points=part.points[:0], cells=part.cells[:0]), count, size, facet_keys(part.facets, count)
-
-
-def _tagged_facets(mesh: Mesh, known: Integers, tags: Tags, points: int) -> tuple[Integers, Integers]:
-    """Local facets that belong to a face, ascending, and their tags, by the keys `known` of facets with `tags`."""
+def _tagged_facets(mesh: Mesh, part: PartMesh, points: int) -> tuple[Integers, Integers]:
+    """Local facets that belong to a face, ascending, and their tags; `points`: number of those of the whole part."""
     facets, cells, which = boundary(mesh)
     nodes = np.take_along_axis(geometry_nodes(mesh)[cells], reference_facets(mesh)[which], axis=1)
     keys = facet_keys(np.asarray(mesh.geometry.input_global_indices)[nodes], points)
-    order = np.argsort(known)
-    sorted_keys = known[order]
-    if not sorted_keys.size or not keys.size:
-        return np.empty(0, dtype=np.int32), np.empty(0, dtype=np.int32)
-    place = np.minimum(np.searchsorted(sorted_keys, keys), sorted_keys.size - 1)
-    known_here = sorted_keys[place] == keys
-    return facets[known_here].astype(np.int32), tags[order[place[known_here]]].astype(np.int32)
+    known = facet_keys(part.facets, points)
+    _, here, there = np.intersect1d(keys, known, assume_unique=True, return_indices=True)
+    order = np.argsort(here)
+    return facets[here[order]].astype(np.int32), part.facet_tag[there[order]].astype(np.int32)

@@ -6,7 +6,7 @@ Names of element types are meshio's; nodes are in gmsh's order.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -66,14 +66,14 @@ class MeshBlocks:
         self.regions, self.facets = (defaultdict[str, list[Integers]](list) for _ in range(2))
         self.surfaces, self.lines = list[Integers](), list[Integers]()
 
-    def add_solids(self, kind: str, cells: Integers, groups: Groups = ()) -> None:
+    def add_solids(self, kind: str, cells: Integers, groups: Groups) -> None:
         """Volume elements (c, v) in gmsh's order of nodes."""
         self.blocks.append((kind, cells))
         for name, members in groups:
             self.regions[name].append(self.count + members)
         self.count += len(cells)
 
-    def add_surfaces(self, corners: Integers, groups: Groups = ()) -> None:
+    def add_surfaces(self, corners: Integers, groups: Groups) -> None:
         """Triangles or quadrilaterals (k, 3 or 4)."""
         self.surfaces.append(corners)
         for name, members in groups:
@@ -86,6 +86,15 @@ class MeshBlocks:
         return RawMesh(points, self.blocks, *groups, self.surfaces, self.lines, tuple(remarks))
 
 
+def left_out(others: Mapping[str, int], unread: Collection[str]) -> Iterator[str]:
+    """What to say of a deck's `others`, numbers of elements by type, and of what it has that is not read."""
+    if others:
+        listed = ", ".join(f"{count} {kind}" for kind, count in others.items())
+        yield f"elements that are not solids are left out, with their stiffness and mass: {listed}"
+    if unread:
+        yield f"not read: {', '.join(unread)}"
+
+
 @struct
 class Source:
     """A part, and the groups of facets or points that its file names."""
@@ -96,16 +105,16 @@ class Source:
     masses: Sequence[PointMass] = ()  # concentrated ones that the part does not have
 
 
-def source_from(raw: RawMesh, where: str) -> Source:
-    """One mesh from the blocks of `raw`, each cell once; `where` (file and key) begins the messages.
+def source_from(raw: RawMesh) -> Source:
+    """One mesh from the blocks of `raw`, each cell once.
 
     Raises `InputError` for no volume elements, unsupported or mixed ones, curved hexahedra of 20 nodes, and nodes that
     are not there or nowhere.
     """
-    kind = _only_kind(raw, where)
+    kind = _only_kind(raw)
     cell, degree = _SUPPORTED[kind]
     cells: Integers = np.concatenate([block for _, block in raw.blocks])
-    _check_nodes(raw, cells, where)
+    _check_nodes(raw, cells)
     _, first, like = np.unique(np.sort(cells, axis=1), axis=0, return_index=True, return_inverse=True)
     kept = np.sort(first)  # each cell once, in the file's order
     once = np.searchsorted(kept, first)[like.reshape(-1)]
@@ -114,9 +123,7 @@ def source_from(raw: RawMesh, where: str) -> Source:
     cell_tag, tags = _tags(len(cells), regions)
     straight = degree == 2 and _is_straight(raw.points, cells, cell)
     if kind == "hexahedron20" and not straight:
-        raise InputError(
-            f"{where}: expected hexahedra of 8 or 27 nodes where edges are curved", "hexahedra of 20 nodes"
-        )
+        raise InputError("expected hexahedra of 8 or 27 nodes where edges are curved", "hexahedra of 20 nodes")
     if straight:
         cells, degree = cells[:, : len(CELLS[cell].corners)], 1
     used, flat = np.unique(cells, return_inverse=True)
@@ -155,7 +162,7 @@ def _facets(pieces: Sequence[Integers], number: Integers, part: PartMesh) -> Int
     return np.concatenate([*(number[piece] for piece in pieces if piece.shape[1] == sides), *strange])
 
 
-def _check_nodes(raw: RawMesh, cells: Integers, where: str) -> None:
+def _check_nodes(raw: RawMesh, cells: Integers) -> None:
     """Check that `cells` and groups have nodes of the file, and that those of cells are at some place."""
     groups = [piece for pieces in raw.facet_groups.values() for piece in pieces]
     for what, nodes in [("cells", cells), *(("facets", piece) for piece in groups)]:
@@ -163,15 +170,15 @@ def _check_nodes(raw: RawMesh, cells: Integers, where: str) -> None:
         if np.any(outside):
             first = int(np.argmax(outside)) + 1
             raise InputError(
-                f"{where}: expected {what} with nodes 1 to {len(raw.points)} of the file",
+                f"expected {what} with nodes 1 to {len(raw.points)} of the file",
                 f"{np.sum(outside)} of {len(nodes)} with others, first in number {first}",
             )
     if any(np.any((group < 0) | (group >= len(raw.points))) for group in raw.point_groups.values()):
-        raise InputError(f"{where}: expected sets of nodes of the file", "missing nodes")
+        raise InputError("expected sets of nodes of the file", "missing nodes")
     with np.errstate(over="ignore"):
         lost = ~np.isfinite(np.sum(raw.points[np.unique(cells)] ** 2, axis=1))
     if np.any(lost):
-        raise InputError(f"{where}: expected nodes with finite coordinates", f"{np.sum(lost)} without")
+        raise InputError("expected nodes with finite coordinates", f"{np.sum(lost)} without")
 
 
 def _left_out(raw: RawMesh, cells: Integers, cell: CellName) -> Iterator[str]:
@@ -208,7 +215,7 @@ def _tags(count: int, regions: Mapping[str, Integers]) -> tuple[NDArray[np.int32
     return tag, {name: tuple(ordered[name]) for name in largest}
 
 
-def _only_kind(raw: RawMesh, where: str) -> str:
+def _only_kind(raw: RawMesh) -> str:
     counts: dict[str, int] = {}
     for kind, cells in raw.blocks:
         counts[kind] = counts.get(kind, 0) + len(cells)
@@ -216,13 +223,13 @@ def _only_kind(raw: RawMesh, where: str) -> str:
     if not listed:
         shells = sum(map(len, raw.surfaces))
         hint = f": {shells} triangles or quadrilaterals (shells) only" if shells else ""
-        raise InputError(f"{where}: expected a mesh of volume elements", f"none{'; '.join((hint, *raw.remarks))}")
+        raise InputError("expected a mesh of volume elements", f"none{'; '.join((hint, *raw.remarks))}")
     unsupported = [kind for kind in counts if kind not in _SUPPORTED]
     if unsupported:
         known = "tetrahedra of 4 or 10 nodes, hexahedra of 8 or 27 nodes"
-        raise InputError(f"{where}: expected {known}", f"unsupported elements: {listed}")
+        raise InputError(f"expected {known}", f"unsupported elements: {listed}")
     if len(counts) > 1:
-        raise InputError(f"{where}: expected volume elements of one type", f"a mixture: {listed}")
+        raise InputError("expected volume elements of one type", f"a mixture: {listed}")
     return next(iter(counts))
 
 

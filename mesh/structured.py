@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -10,11 +11,9 @@ from ..common.arrays import Array, Integers
 from .cells import KUHN, CellName
 from .part_mesh import PartMesh
 
-Divisions = tuple[int, int, int]
-
 
 def structured_box(
-    length: float, root: tuple[float, float], tip: tuple[float, float], divisions: Divisions, cell: CellName
+    length: float, root: tuple[float, float], tip: tuple[float, float], divisions: tuple[int, int, int], cell: CellName
 ) -> PartMesh:
     """A box along x, 0 … `length` (m), centerd on the axis, of hexahedra, or tetrahedra in their place.
 
@@ -25,21 +24,13 @@ def structured_box(
     height = root[0] + (tip[0] - root[0]) * x
     width = root[1] + (tip[1] - root[1]) * x
     points: Array = np.stack([length * x, height * (y - 0.5), width * (z - 0.5)], axis=-1).reshape(-1, 3)
-    cells = _hexahedra(divisions)
+    number, low, high = np.arange(x.size).reshape(x.shape), slice(None, -1), slice(1, None)
+    # gmsh's corner order: around the lower face (z), then around the upper one.
+    around = [(low, low), (high, low), (high, high), (low, high)]
+    cells: Integers = np.stack([number[i, j, k].ravel() for k in (low, high) for i, j in around], axis=1)
     if cell == "tetrahedron":
         cells = cells[:, KUHN].reshape(-1, 4)
     return PartMesh(points, cells, cell, 1, np.zeros(len(cells), dtype=np.int32))
-
-
-def _hexahedra(divisions: Divisions) -> Integers:
-    """(c, 8) corners in gmsh's order."""
-    nx, ny, nz = divisions
-    number = np.arange((nx + 1) * (ny + 1) * (nz + 1)).reshape(nx + 1, ny + 1, nz + 1)
-    low, high = slice(None, -1), slice(1, None)
-    # gmsh's corner order: around the lower face (z), then around the upper one.
-    around = [(low, low), (high, low), (high, high), (low, high)]
-    corners = [number[i, j, k].ravel() for k in (low, high) for i, j in around]
-    return np.stack(corners, axis=1)
 
 
 # Points closer than this, relative to the length, are one point.
@@ -59,17 +50,15 @@ def graded_nodes(breakpoints: Sequence[float], elements: int) -> Array:
     for _ in range(elements - lengths.size):
         shares[np.argmax(lengths / shares)] += 1
     pieces = [
-        np.linspace(start, end, share + 1)
-        for start, end, share in zip(breakpoints[:-1], breakpoints[1:], shares, strict=True)
+        np.linspace(*ends, share, endpoint=False) for ends, share in zip(pairwise(breakpoints), shares, strict=True)
     ]
-    return np.concatenate([pieces[0][:1], *(piece[1:] for piece in pieces)])
+    return np.append(np.concatenate(pieces), breakpoints[-1])
 
 
 def with_points(nodes: Array, points: Sequence[float]) -> Array:
     """Return `nodes` (m,) and `points` in one ascending list (≥ m,); points that coincide with nodes add nothing."""
     length = nodes[-1] - nodes[0]
-    merged = list(nodes)
     for point in points:
-        if np.min(np.abs(np.asarray(merged) - point)) > COINCIDENT * length:
-            merged.append(point)
-    return np.sort(np.asarray(merged, dtype=np.float64))
+        if np.min(np.abs(nodes - point)) > COINCIDENT * length:
+            nodes = np.append(nodes, point)
+    return np.sort(nodes)

@@ -207,7 +207,7 @@ build_key() {
 }
 
 # What defines the forms.
-forms_key() { cat fe_models/forms.py fe_models/beam/dolfinx_forms.py fe_models/solid/{elasticity,functionals}.py | digest; }
+forms_key() { cat fe_models/forms.py fe_models/beam/beam.py fe_models/solid/{elasticity,functionals}.py | digest; }
 
 setup() {
   exec 9<.

@@ -2,8 +2,9 @@
 
 The families of a straight beam with principal axes y and z do not couple. Each gives its stiffness K and mass M over
 its free degrees of freedom, and what the motion is at the stations: all six fields (displacement and rotation of the
-cross section) are continuous piecewise cubics, so cubic Lagrange points hold them exactly. dolfinx assembles K and M.
-Strains at Gauss points, which integrate products exactly, are the root of K: K = BᵀB but for round-off. Loads dolfinx.
+cross section) are continuous piecewise cubics, so cubic Lagrange points hold them exactly. dolfinx assembles K and M
+from weak forms ∫ weight u⁽ⁱ⁾ v⁽ʲ⁾ dx in UFL: a link needs three, with shear six, whatever its families are. Strains at
+Gauss points, which integrate products exactly, are the root of K: K = BᵀB but for round-off. Loads dolfinx.
 """
 
 from __future__ import annotations
@@ -12,14 +13,22 @@ from collections.abc import Mapping
 
 import numpy as np
 import scipy.sparse as sp
+import ufl
+from dolfinx import fem
+from dolfinx import mesh as dolfinx_mesh
+from dolfinx.fem import petsc as fem_petsc
+from mpi4py import MPI
 
 from ...common.arrays import Array
 from ...common.structs import struct
+from ...mesh.compat import compiled_form, function_space
 from ..link_records.families import Family
 from ..link_records.link import BeamLink
-from .dolfinx_forms import BeamForms
-from .line import R_X, R_Y, R_Z, U_X, U_Y, U_Z, hermite, lagrange
+from .line import R_X, R_Y, R_Z, U_X, U_Y, U_Z, Functions, hermite, lagrange
 from .sections import Property, cellwise, rod_properties, second_moment, shear_modulus
+
+Bending = tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, list[int]]
+"""K, M, strains, deflection and rotation at the stations, fixed degrees of freedom."""
 
 
 @struct
@@ -50,10 +59,6 @@ def family_model(link: BeamLink, family: Family, forms: BeamForms, stations: Arr
     free = np.setdiff1d(np.arange(strain.shape[1]), fixed)
     K, M = (A[free][:, free] for A in (K, M))
     return FamilyModel(K, M, strain[:, free], {row: values[:, free] for row, values in fields.items()})
-
-
-# K, M, strains, deflection and rotation at the stations, fixed degrees of freedom.
-Bending = tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, list[int]]
 
 
 def _euler_bernoulli(link: BeamLink, forms: BeamForms, stations: Array, second_moment: Property) -> Bending:
@@ -95,3 +100,59 @@ def _timoshenko(link: BeamLink, forms: BeamForms, stations: Array, second_moment
         sp.hstack([nothing_w, rotation], format="csr"),
         fixed,
     )
+
+
+class BeamForms:
+    """Bilinear forms on the elements between `nodes` (e + 1,), in m."""
+
+    def __init__(self, nodes: Array) -> None:
+        self.nodes = nodes
+        cells = nodes.size - 1
+        self._mesh = dolfinx_mesh.create_interval(MPI.COMM_SELF, cells, [0.0, 1.0])
+        x = self._mesh.geometry.x
+        x[:, 0] = nodes[np.rint(x[:, 0] * cells).astype(int)]
+        self._weight = fem.Function(function_space(self._mesh, 0))
+        middle = self._weight.function_space.tabulate_dof_coordinates()[:, 0]
+        self._element = np.searchsorted(nodes, middle) - 1
+        self._spaces: dict[int, fem.FunctionSpace] = {}
+        self._forms: dict[tuple[int, ...], fem.Form] = {}
+
+    def matrix(
+        self,
+        weight: Array,
+        of: Functions,
+        derivative: int = 0,
+        by: Functions | None = None,
+        derivative_by: int | None = None,
+    ) -> sp.csr_matrix:
+        """Return ∫ weight f⁽ᵈ⁾ g⁽ᵈ⁾ dx, x in m, for weights (e,) of elements: test functions f `of`, trial ones g `by`.
+
+        Without `by` both are the same functions, and so are the derivatives.
+        """
+        by = of if by is None else by
+        order = derivative if derivative_by is None else derivative_by
+        self._weight.x.array[:] = weight[self._element]
+        assembled = fem_petsc.assemble_matrix(self._form(of.degree, derivative, by.degree, order))
+        assembled.assemble()
+        indptr, indices, values = assembled.getValuesCSR()
+        rows, columns = (self._space(one.degree).tabulate_dof_coordinates()[:, 0] for one in (of, by))
+        A = sp.csr_matrix((values, indices, indptr), shape=(rows.size, columns.size))
+        assembled.destroy()
+        # Degrees of freedom of Lagrange functions are values at points.
+        return (of.at(rows).T @ A @ by.at(columns)).tocsr()
+
+    def _form(self, *key: int) -> fem.Form:
+        """The form compiled, by degree and derivative of test and trial functions."""
+        if key not in self._forms:
+            v, u = ufl.TestFunction(self._space(key[0])), ufl.TrialFunction(self._space(key[2]))
+            for _ in range(key[1]):
+                v = v.dx(0)
+            for _ in range(key[3]):
+                u = u.dx(0)
+            self._forms[key] = compiled_form(self._weight * u * v * ufl.dx)
+        return self._forms[key]
+
+    def _space(self, degree: int) -> fem.FunctionSpace:
+        if degree not in self._spaces:
+            self._spaces[degree] = function_space(self._mesh, degree)
+        return self._spaces[degree]

@@ -1,23 +1,42 @@
-"""Inertia shape integrals of a beam, from its fields at the stations.
+"""Inertia shape integrals and geometric stiffness of a beam, from its fields at the stations.
 
 The stations are the Gauss–Lobatto points of cubic elements, so values at stations *are* the degrees of freedom of
 the fields and every integral is a product with a mass matrix, without error.
+
+Geometric stiffness is the work of section forces under unit loads when the beam bends, twists and stretches. Let the
+modes say what the curvatures and strains of the sections are, exactly. With the rotations Th = (φ, θ_y, θ_z) and the
+strains Γ = (u', v' − θ_z, w' + θ_y) of the linear beam, sections then turn by the rotation vector Th + ψ and the axis
+moves by r₂ more (R' = R k~, r' = R (e1 + Γ), integrated to second order):
+
+    ψ' = ½ Th × Th'        r₂' = ψ × e1 + ½ Th × (Th × e1) + Th × Γ
+
+By virtual work a unit load with the section forces n, m in the straight link moves along itself by −½ pᵀK p, where
+
+    pᵀK p = −∫ n·(Th × (Th × e1) + 2 Th × Γ) + m·(Th × Th') dx
+
+K of a moment belongs to the rotation vector. Sections are rigid and the axis keeps its length under twist: what solids
+have besides, N (I_p/A) φ'² of fibers that twist shortens, is left out, as in the rods of Kirchhoff and Reissner.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 import scipy.sparse as sp
+from numpy.polynomial.legendre import leggauss
 
 from ...common.arrays import Array
 from ..link_records.link import BeamLink
-from ..modal_body.parts import Invariants
+from ..modal_body.lumped_masses import of_turning
+from ..modal_body.parts import LEVI_CIVITA, Invariants
+from ..modal_body.unit_loads import inertia_wrenches, interface_load_names, unit_load_names
 from .line import R_X, R_Y, R_Z, U_X, U_Y, U_Z, Functions, gram
 from .sections import Property, cellwise
 
 
 def shape_integrals(link: BeamLink, stations: Functions, fields: Array) -> Invariants:
-    """Inertia shape integrals (docs/theory.md) over axis and cross section; `fields` (6, k, n) U_X … R_Z at k stations.
+    """Inertia shape integrals (docs/theory.md) over the volume; `fields` (6, k, n) U_X … R_Z (m, rad) at k stations.
 
     With displacement (u, v, w) and rotation (φ, θ_y, θ_z) of the section, a point (x, y, z) moves by Φ0 + y Φy + z Φz,
     Φ0 = (u, v, w), Φy = (−θ_z, 0, φ), Φz = (θ_y, −φ, 0); principal axes leave ∫y = ∫z = ∫yz = 0.
@@ -73,3 +92,127 @@ def shape_integrals(link: BeamLink, stations: Functions, fields: Array) -> Invar
 def weighted(link: BeamLink, stations: Functions, moment: Property, rho: float) -> sp.csr_matrix:
     """Return the matrix (k, k) of ∫ρ·moment·a b dx for two fields a, b at the stations."""
     return gram(stations.root(cellwise(link, stations.nodes, lambda s: rho * moment(s))))
+
+
+ROTARY: Sequence[tuple[Property, Sequence[float]]] = (
+    (lambda s: s.I_yy, (1.0, 0.0, 1.0)),
+    (lambda s: s.I_zz, (1.0, 1.0, 0.0)),
+)
+"""Second moments of a section, and about which axes they make it inert."""
+
+POINTS = 5  # Gauss points of an element: exact, since of cubics no product is of a degree above 8
+
+
+def geometric_stiffness(
+    link: BeamLink, stations: Functions, fields: Array, interfaces: dict[str, float]
+) -> dict[str, Array]:
+    """Return geometric stiffness (n, n) by unit load (`unit_loads`), under the link's reference condition.
+
+    `fields` (6, k, n) are rows U_X … R_Z at k stations; every interface, at its m from the root, is a vertex of their
+    mesh. Euler–Bernoulli links are a line of mass: their spin inertia has no second-order motion.
+    """
+    x, weight, values, slopes = _at_gauss_points(stations, fields)
+    forces = section_forces(link, x, interfaces, ROTARY if link.model.theory == "timoshenko" else ())
+    names, n = unit_load_names(interfaces), fields.shape[2]
+    weighted_forces = np.array([forces[name] for name in names]) * weight  # (loads, 6, g)
+    total = np.zeros((len(names), n, n))
+    for row, products in enumerate(_products(values, slopes)):
+        total += np.tensordot(weighted_forces[:, row], products, axes=1)
+    matrices = dict(zip(names, 0.5 * (total + total.transpose(0, 2, 1)), strict=True))
+    if link.model.theory == "timoshenko":
+        for k, (moment, _) in enumerate(ROTARY, start=1):
+            W = weighted(link, stations, moment, link.material.density)
+            products = np.array([[a.T @ (W @ b) for b in fields[R_X:]] for a in fields[R_X:]])
+            for name, matrix in of_turning(np.diag(np.eye(3)[k]), products).items():
+                matrices[name] = matrices[name] + matrix
+    return matrices
+
+
+def _at_gauss_points(stations: Functions, fields: Array) -> tuple[Array, Array, Array, Array]:
+    """Points x (g,) m with their weights (g,) m, and fields (6, g, n) there with their derivatives by x."""
+    nodes, weights = leggauss(POINTS)  # type: ignore[no-untyped-call, unused-ignore]
+    lengths = stations.lengths[:, None]
+    at = (stations.nodes[:-1, None] + lengths * 0.5 * (nodes + 1)).ravel()
+    values, slopes = (np.array([stations.at(at, order) @ field for field in fields]) for order in (0, 1))
+    return at, (0.5 * lengths * weights).ravel(), values, slopes
+
+
+def _products(values: Array, slopes: Array) -> Array:
+    """(6, g, n, n) what n_x … m_z do work on: see the module."""
+    Th, rate, Gamma = values[R_X:], slopes[R_X:], slopes[:R_X].copy()
+    turned = np.stack([np.zeros_like(Th[0]), Th[2], -Th[1]])  # Th × e1
+    Gamma[1:] -= turned[1:]
+    on_forces, on_moments = (
+        -np.einsum("cab,agm,bgn->cgmn", LEVI_CIVITA, Th, other, optimize=True) for other in (turned + 2 * Gamma, rate)
+    )
+    return np.concatenate([on_forces, on_moments])
+
+
+def section_forces(
+    link: BeamLink, x: Array, interfaces: Mapping[str, float], rotary: Sequence[tuple[Property, Sequence[float]]]
+) -> dict[str, Array]:
+    """Return force and moment (6, g) at x (g,) in the straight link by unit load, under its reference condition.
+
+    Loads at the tip act on the section there, too. `rotary`: the inertia of sections that turn, see `ROTARY`.
+    """
+    by_load, length = _of_inertia(link, x, rotary), link.geometry.length
+    for name, position in interfaces.items():
+        beyond = np.where((x < position) | (position == length), 1.0, 0.0)
+        for load, unit in zip(interface_load_names([name]), np.eye(6)[:, :, None], strict=True):
+            by_load[load] = of_load(unit, position - x) * beyond, of_load(unit, np.array([position]))
+    if link.reference.holds_root:
+        return {load: forces for load, (forces, _) in by_load.items()}
+    return {load: forces + of_tip_support(link, x, at_root) for load, (forces, at_root) in by_load.items()}
+
+
+def of_load(load: Array, arm: Array) -> Array:
+    """Return force (N), moment (N·m) (6, g), from `load` (6, 1) or (6, g), that acts `arm` (g,), m, further along x."""
+    force, moment = load[:3] * np.ones_like(arm), load[3:]
+    return np.concatenate([force, moment + _lever(force * arm)])
+
+
+def _lever(force: Array) -> Array:
+    """e1 × f of f (3, …)."""
+    return np.stack([np.zeros_like(force[0]), -force[2], force[1]])
+
+
+def of_tip_support(link: BeamLink, x: Array, at_root: Array) -> Array:
+    """Force, N, and moment, N·m (6, g) at x (g,), m, of a tip support that bears moments `at_root` (6, 1) or (6, g)."""
+    L, none = link.geometry.length, np.zeros_like(at_root[0])
+    return of_load(np.stack([none, -at_root[5] / L, at_root[4] / L, none, none, none]), L - x)
+
+
+def _of_inertia(
+    link: BeamLink, x: Array, rotary: Sequence[tuple[Property, Sequence[float]]]
+) -> dict[str, tuple[Array, Array]]:
+    """(6, g) of d'Alembert's loads on the link fixed at its root, and their sums about the root (6, 1).
+
+    Sections at s bear forces ρA (a + b s), of small bodies at 0 and 1 m, and, with rotary inertia, moments.
+    """
+    e1, nothing = np.eye(3)[:1], np.zeros(1)
+    M = [_beyond(link, np.append(x, 0.0), lambda s: s.area, power) for power in range(3)]
+    turning = [
+        (_beyond(link, np.append(x, 0.0), moment, 0), inertia_wrenches(0 * e1, nothing, np.array([inertia])))
+        for moment, inertia in rotary
+    ]
+    at_0, at_1 = (inertia_wrenches(place, np.ones(1), np.zeros((1, 3))) for place in (0 * e1, e1))
+    forces = {}
+    for load in at_0:
+        a = at_0[load][0, :3, None]
+        b = at_1[load][0, :3, None] - a
+        n = a * M[0] + b * M[1]
+        m = _lever(a * M[1] + b * M[2] - np.append(x, 0.0) * n)
+        m = m + sum(wrenches[load][0, 3:, None] * J for J, wrenches in turning)
+        both = np.concatenate([n, m])
+        forces[load] = both[:, :-1], both[:, -1:]
+    return forces
+
+
+def _beyond(link: BeamLink, x: Array, moment: Property, power: int) -> Array:
+    """∫_x^L ρ·moment·sᵖ ds for each x (g,)."""
+    total = np.zeros_like(x)
+    points = link.geometry.breakpoints
+    for start, end, section in zip(points[:-1], points[1:], link.sections, strict=True):
+        lower = np.clip(x, start, end)
+        total += link.material.density * moment(section) * (end ** (power + 1) - lower ** (power + 1)) / (power + 1)
+    return total

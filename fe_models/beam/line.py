@@ -39,7 +39,7 @@ class Functions:
         return np.diff(self.nodes)
 
     def at(self, x: Array, derivative: int = 0) -> sp.csr_matrix:
-        """Return the matrix (k, size) of values, or of a derivative by x, at points x (k,) of the axis."""
+        """Return the matrix (k, size) of values, or of a derivative by x, at points x (k,), m, of the axis."""
         cell = np.clip(np.searchsorted(self.nodes, x, side="right") - 1, 0, len(self.element) - 1)
         return self._within(cell, (x - self.nodes[cell]) / self.lengths[cell], derivative)
 
@@ -53,7 +53,7 @@ class Functions:
         return sp.csr_matrix((shapes.ravel(), (row, self.element[cell].ravel())), shape=(X.size, self.x.size))
 
     def root(self, weight: Array, derivative: int = 0) -> sp.csr_matrix:
-        """B (4e, size) with BᵀB = ∫ weight f⁽ᵈ⁾ g⁽ᵈ⁾ dx, for weights (e,) of the elements."""
+        """B (4e, size) with BᵀB = ∫ weight f⁽ᵈ⁾ g⁽ᵈ⁾ dx, for weights (e,) of the elements, x in m."""
         points, weights = leggauss(GAUSS)  # type: ignore[no-untyped-call, unused-ignore]
         elements = len(self.element)
         values = self._within(np.repeat(np.arange(elements), GAUSS), np.tile(0.5 * (points + 1), elements), derivative)
@@ -71,7 +71,7 @@ def gram(B: sp.csr_matrix) -> sp.csr_matrix:
 
 
 def lagrange(nodes: Array, degree: int) -> Functions:
-    """Return polynomials of degree 2 or 3 by values at Gauss–Lobatto points of elements between `nodes` (e + 1,)."""
+    """Return polynomials of degree 2 or 3 by values at Gauss–Lobatto points of elements between `nodes` (e + 1,), m."""
     inner = {2: [0.0], 3: [-np.sqrt(0.2), np.sqrt(0.2)]}[degree]
     X = 0.5 * (1.0 + np.array([-1.0, *inner, 1.0]))
     element = degree * np.arange(nodes.size - 1)[:, None] + np.arange(degree + 1)
@@ -80,12 +80,7 @@ def lagrange(nodes: Array, degree: int) -> Functions:
 
 
 def hermite(nodes: Array) -> Functions:
-    """Cubics, by value and slope at each of `nodes` (e + 1,)."""
+    """Cubics, by value and slope at each of `nodes` (e + 1,), m."""
     powers = np.array([[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]], dtype=np.float64).T
     element = 2 * np.arange(nodes.size - 1)[:, None] + np.arange(4)
     return Functions(nodes, np.repeat(nodes, 2), element, powers, np.array([0, 1, 0, 1]))
-
-
-def on_axis(x: Array) -> Array:
-    """Return points (k, 3), m, of the axis at x (k,), m."""
-    return np.stack([x, np.zeros_like(x), np.zeros_like(x)], axis=1)

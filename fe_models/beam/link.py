@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,15 +17,12 @@ from ..link_records.families import DEFAULT_COUNT, FAMILIES, Family
 from ..link_records.link import BeamLink
 from ..modal_body import Interface, ModalBody, PictureMesh, Stations
 from ..modal_body.attachment_modes import ascending
-from ..modal_body.damping import canonical_signs, damping_ratio
 from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_masses, with_lumped_stiffness
-from .attachment_modes import attachment_modes, fixed_interfaces, ritz_modes
-from .beam import FamilyModel, family_model
-from .dolfinx_forms import BeamForms
-from .eigen import lowest_modes
-from .geometric_stiffness import geometric_stiffness
-from .invariants import shape_integrals
-from .line import R_X, Functions, lagrange, on_axis
+from ..modal_body.measured import canonical_signs, damping_ratio
+from .beam import BeamForms, FamilyModel, family_model
+from .invariants import geometric_stiffness, shape_integrals
+from .line import R_X, Functions, lagrange
+from .modes import Mode, attachment_modes, fixed_interfaces, lowest_modes, modes_of, ritz_modes
 from .sections import section_outlines, shear_modulus
 from .stress import beam_stresses, segments, stress_loads
 
@@ -36,36 +32,37 @@ SLIVER = 0.01
 Progress = Callable[[str], None]
 
 
-class Mode(NamedTuple):
-    """One mode: ω² in rad²/s², its family, and x (m,), the degrees of freedom of that family's model, xᵀMx = 1."""
-
-    omega2: float
-    family: Family
-    x: Array
-
-
 def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody:
     """Compute the modal body of `link`, read from `path`; its hashes are left empty.
 
     Raises `InputError` for more modes than the mesh has, `SolveError` where round-off errors spoil the modes.
     """
-    length = link.geometry.length
     named = link.places
-    models, stations = loaded_models(link, link.families, progress)
+    models, stations = _loaded_models(link, progress)
     progress(f"{link.name}: solving for the modes")
     places = [int(np.argmin(np.abs(stations.x - place))) for place in named.values()]
     modes, static = _modes(link, models, places, path)
     count = len(modes)
     modes += static
-    fields = station_fields(models, modes, stations.x.size)
+    fields, modal_mass = np.zeros((6, stations.x.size, len(modes))), np.zeros((len(modes), len(modes)))
+    for k, one in enumerate(modes):
+        model = models[one.family]
+        for row, values in model.fields.items():
+            fields[row, :, k] = values @ one.x
+        for i, other in enumerate(modes[: k + 1]):
+            if other.family == one.family:
+                modal_mass[i, k] = modal_mass[k, i] = one.x @ (model.M @ other.x)
     fields = fields * canonical_signs(fields)
     progress(f"{link.name}: integrating the inertia")
-    interfaces = {name: _interface(stations, fields, place) for name, place in named.items()}
+    interfaces = {
+        name: Interface(np.array([x, 0.0, 0.0]), fields[:R_X, k], fields[R_X:, k])
+        for (name, x), k in zip(named.items(), places, strict=True)
+    }
     attached = lumps(link.interface, interfaces)
     integrals = with_lumped_masses(shape_integrals(link, stations, fields), attached)
     omega: Array = np.sqrt([mode.omega2 for mode in modes])
     translation, rotation = np.moveaxis(fields[:R_X], 0, 1), np.moveaxis(fields[R_X:], 0, 1)
-    position = on_axis(stations.x)
+    position = np.outer(stations.x, [1.0, 0.0, 0.0])
     families = tuple(mode.family for mode in modes)
     residual = np.repeat([0, 1], [count, omega.size - count])
     kept = _with_sections(link, stations, position, translation, rotation)
@@ -73,11 +70,11 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
         name=link.name,
         kind=link.geometry.kind,
         reference_condition=link.reference.condition,
-        length=length,
+        length=link.geometry.length,
         **vars(integrals),
         frequency=as_floats(omega / (2 * np.pi)),
         stiffness=np.diag(omega**2),
-        modal_mass=modal_mass(models, modes),
+        modal_mass=modal_mass,
         damping_ratio=damping_ratio(link, omega),
         damping_of=link.damping.of,
         family=families,
@@ -94,17 +91,23 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
     )
 
 
-def loaded_models(
-    link: BeamLink, families: Sequence[Family], progress: Progress = lambda _: None
-) -> tuple[dict[Family, FamilyModel], Functions]:
-    """The eigenproblems of `families` with the masses on interfaces, and the stations at which they are read."""
+def _loaded_models(link: BeamLink, progress: Progress) -> tuple[dict[Family, FamilyModel], Functions]:
+    """The eigenproblems of the families with the masses on interfaces, and the stations at which they are read."""
     nodes = _element_boundaries(link)
     # The fields are read on elements of their own: there also the middle and the interfaces are nodes.
     stations = lagrange(with_points(nodes, [0.5 * link.geometry.length, *link.places.values()]), 3)
     forms, models = BeamForms(nodes), dict[Family, FamilyModel]()
-    for family in families:
+    for family in link.families:
         progress(f"{link.name}: assembling {family}")
-        models[family] = _loaded(family_model(link, family, forms, stations.x), link, stations.x)
+        model = family_model(link, family, forms, stations.x)
+        M = model.M
+        for record in link.interface:  # M ← M + Σ m w wᵀ + J θ θᵀ, w and θ the motion there
+            station = np.argmin(np.abs(stations.x - link.places[record.name]))
+            weights = lump_weights(record.mass, record.inertia)
+            for row, values in model.fields.items():
+                if weights[row]:
+                    M = M + weights[row] * (values[station].T @ values[station])
+        models[family] = replace(model, M=M.tocsr())
     return models, stations
 
 
@@ -112,25 +115,20 @@ def _with_sections(
     link: BeamLink, stations: Functions, position: Array, translation: Array, rotation: Array
 ) -> Stations:
     """The stations, with extents, outlines and rigidities of the sections from each on; GJ where there is a ν."""
-    segment = segments(link, stations.x)
-    sections, E = link.sections, link.material.youngs_modulus
-    height, width = (np.array([getattr(section, key) for section in sections]) for key in ("height", "width"))
-    rigidity = E * np.array([[section.area, section.I_yy, section.I_zz] for section in sections])[segment]
-    twist = None
-    if link.material.poissons_ratio is not None:
-        twist = (shear_modulus(link) * np.array([section.torsion for section in sections]))[segment]
-    outlines = section_outlines(link.shapes)[segment]
+    segment, E = segments(link, stations.x), link.material.youngs_modulus
+    of_segment = [(s.height, s.width, E * s.area, E * s.I_yy, E * s.I_zz, s.torsion) for s in link.sections]
+    height, width, EA, EI_yy, EI_zz, J = np.array(of_segment)[segment].T
     return Stations(
         position,
         translation,
         rotation,
-        height[segment],
+        height,
         stations.element,
-        outline=outlines,
-        rigidity=rigidity[:, :2],
-        width=width[segment],
-        out_of_plane_rigidity=rigidity[:, 2],
-        torsional_rigidity=twist,
+        outline=section_outlines(link.shapes)[segment],
+        rigidity=np.stack([EA, EI_yy], axis=1),
+        width=width,
+        out_of_plane_rigidity=EI_zz,
+        torsional_rigidity=None if link.material.poissons_ratio is None else shear_modulus(link) * J,
     )
 
 
@@ -143,64 +141,30 @@ def _modes(
     if is_fixed:
         for family, model in models.items():
             fixed[family], Z[family] = fixed_interfaces(model, family, places)
-    modes = select_default(fixed) if link.modes.are_default else select(fixed, _wanted(link, fixed, path))
+    wanted = None if link.modes.are_default else _wanted(link, fixed, path)
+    modes = list[Mode]()
+    for family, model in fixed.items():
+        count = min(wanted[-1] if wanted else DEFAULT_COUNT[family], model.K.shape[0])
+        modes += modes_of(family, *lowest_modes(model, count))
+    modes = _by_frequency(modes)
+    modes = [modes[number - 1] for number in wanted] if wanted else modes
     if is_fixed:
         modes = [mode._replace(x=Z[mode.family] @ mode.x) for mode in modes]
     if not link.modes.attachment_modes:
         return modes, []
-    known = {family: _together(models[family], family, modes) for family in models}
-    static = [Mode(*mode) for mode in attachment_modes(models, known, places, link.geometry.length, not is_fixed)]
-    return _ritz(models, modes, static) if is_fixed else (modes, _by_frequency(static))
-
-
-def _ritz(
-    models: Mapping[Family, FamilyModel], modes: Sequence[Mode], static: Sequence[Mode]
-) -> tuple[list[Mode], list[Mode]]:
-    """Modes of the floating frame in the space of fixed-interface modes and static shapes, family by family."""
     lower, higher = list[Mode](), list[Mode]()
     for family, model in models.items():
-        pair = ritz_modes(model, family, _together(model, family, modes), _together(model, family, static))
-        for kept, of_family in zip((lower, higher), pair, strict=True):
-            kept += [Mode(*mode) for mode in of_family]
-    return _by_frequency(lower), _by_frequency(higher)
-
-
-def _loaded(model: FamilyModel, link: BeamLink, stations: Array) -> FamilyModel:
-    """The eigenproblem with the masses on interfaces: M ← M + Σ m w wᵀ + J θ θᵀ, w and θ the motion there."""
-    M = model.M
-    for record in link.interface:
-        station = np.argmin(np.abs(stations - link.places[record.name]))
-        weights = lump_weights(record.mass, record.inertia)
-        for row, values in model.fields.items():
-            if weights[row]:
-                M = M + weights[row] * (values[station].T @ values[station])
-    return replace(model, M=M.tocsr())
-
-
-def select(models: Mapping[Family, FamilyModel], wanted: Sequence[int]) -> list[Mode]:
-    """The modes numbered `wanted` (ascending; 1 is the lowest of all families together).
-
-    Equal frequencies (bending of a square or round section) are distinguished by the order of the families, not by
-    round-off errors: the choice is the same on every machine.
-    """
-    modes = []
-    for family, model in models.items():
-        omega2, X = lowest_modes(model.K, model.M, model.strain, min(wanted[-1], model.K.shape[0]))
-        modes += [Mode(square, family, x) for square, x in zip(omega2, X.T, strict=True)]
-    modes = _by_frequency(modes)
-    return [modes[number - 1] for number in wanted]
-
-
-def select_default(models: Mapping[Family, FamilyModel]) -> list[Mode]:
-    """Select the default number of modes of each family for a link with attachment modes, ascending."""
-    modes = []
-    for family, model in models.items():
-        count = min(DEFAULT_COUNT[family], model.K.shape[0])
-        modes += select({family: model}, range(1, count + 1))
-    return _by_frequency(modes)
+        X = _together(model, family, modes)
+        static = attachment_modes(model, family, X, places, link.geometry.length, not is_fixed)
+        if is_fixed:
+            of_family, static = ritz_modes(model, family, X, _together(model, family, static))
+            lower += of_family
+        higher += static
+    return _by_frequency(lower) if is_fixed else modes, _by_frequency(higher)
 
 
 def _by_frequency(modes: Sequence[Mode]) -> list[Mode]:
+    """Ascending; equal ones (bending of square or round sections) by family, not by round-off: the same anywhere."""
     families = np.array([FAMILIES.index(mode.family) for mode in modes], dtype=np.int64)
     return [modes[k] for k in ascending(np.array([mode.omega2 for mode in modes]), families)]
 
@@ -208,25 +172,6 @@ def _by_frequency(modes: Sequence[Mode]) -> list[Mode]:
 def _together(model: FamilyModel, family: Family, modes: Sequence[Mode]) -> Array:
     """(m, n) those of `modes` that belong to a family."""
     return np.array([mode.x for mode in modes if mode.family == family]).reshape(-1, model.K.shape[0]).T
-
-
-def station_fields(models: Mapping[Family, FamilyModel], modes: Sequence[Mode], stations: int) -> Array:
-    """Return displacement and rotation (6, k, n), rows U_X … R_Z, of n modes at k stations."""
-    fields = np.zeros((6, stations, len(modes)))
-    for k, mode in enumerate(modes):
-        for row, values in models[mode.family].fields.items():
-            fields[row, :, k] = values @ mode.x
-    return fields
-
-
-def modal_mass(models: Mapping[Family, FamilyModel], modes: Sequence[Mode]) -> Array:
-    """Return m_ff (n, n) = xᵀMx as assembled; families do not couple."""
-    products = np.zeros((len(modes), len(modes)))
-    for i, one in enumerate(modes):
-        for j, other in enumerate(modes[: i + 1]):
-            if one.family == other.family:
-                products[i, j] = products[j, i] = one.x @ (models[one.family].M @ other.x)
-    return products
 
 
 def _element_boundaries(link: BeamLink) -> Array:
@@ -259,8 +204,3 @@ def _wanted(link: BeamLink, models: Mapping[Family, FamilyModel], path: Path) ->
             wanted[-1],
         )
     return wanted
-
-
-def _interface(stations: Functions, fields: Array, position: float) -> Interface:
-    station = int(np.argmin(np.abs(stations.x - position)))
-    return Interface(on_axis(np.array([position]))[0], fields[:R_X, station], fields[R_X:, station])

@@ -11,7 +11,7 @@ from math import hypot, pi
 import numpy as np
 
 from ...common.arrays import Array
-from ...mesh.records import CircleSection, RectangleSection, SectionRecord, TubeSection
+from ...mesh.records import RectangleSection, SectionRecord
 from ..link_records.section import Section
 
 MEAN_POINTS = 40  # of a mean over a face: 1e-6 where the patch is as wide as the face, at whose edges shear falls to 0
@@ -23,8 +23,7 @@ def contains(record: SectionRecord, y: float, z: float) -> bool:
     slack = 1e-9
     if isinstance(record, RectangleSection):
         return abs(y) <= record.height / 2 * (1 + slack) and abs(z) <= record.width / 2 * (1 + slack)
-    outer, inner = _radii(record)
-    return inner * (1 - slack) <= hypot(y, z) <= outer * (1 + slack)
+    return record.inner * (1 - slack) <= 2 * hypot(y, z) <= record.outer * (1 + slack)
 
 
 def section_stress(record: SectionRecord, section: Section, F: Array, M: Array, y: float, z: float) -> Array:
@@ -57,7 +56,7 @@ def _transverse(record: SectionRecord, distance: float, across: bool = False) ->
         half = (record.width if across else record.height) / 2
         return (half**2 - distance**2) / 2
     # Q = ⅔ (outer^³⁄₂ − inner^³⁄₂), b = 2 (outer^½ − inner^½), written without the quotient.
-    outer, inner = (max(radius**2 - distance**2, 0.0) for radius in _radii(record))
+    outer, inner = (max(radius**2 - distance**2, 0.0) for radius in (record.outer / 2, record.inner / 2))
     return float(outer + np.sqrt(outer * inner) + inner) / 3
 
 
@@ -84,10 +83,3 @@ def _stress_function(a: float, b: float, X: float, Y: float) -> tuple[float, flo
     cosh, sinh = decay * (1 + np.exp(-2 * k * abs(Y))), np.sign(Y) * decay * (1 - np.exp(-2 * k * abs(Y)))
     scale = 16 * a / pi**2 * sign / n**2
     return float(-2 * X + (scale * cosh) @ np.sin(k * X)), float(-(scale * sinh) @ np.cos(k * X))
-
-
-def _radii(record: CircleSection | TubeSection) -> tuple[float, float]:
-    """Outer and inner radius, m."""
-    if isinstance(record, CircleSection):
-        return record.diameter / 2, 0.0
-    return record.outer / 2, record.inner / 2

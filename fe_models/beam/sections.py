@@ -36,7 +36,7 @@ def second_moment(family: Family) -> Property:
 
 
 def cellwise(link: BeamLink, nodes: Array, quantity: Property) -> Array:
-    """Return a section property (e,) of each element between `nodes` (e + 1,)."""
+    """Return a section property (e,), in its own unit, of each element between `nodes` (e + 1,), m."""
     segment = np.searchsorted(link.geometry.breakpoints[1:-1], 0.5 * (nodes[1:] + nodes[:-1]))
     return np.array([quantity(section) for section in link.sections])[segment]
 
@@ -60,7 +60,6 @@ def _outline(section: SectionRecord, q: int) -> Array:
         s = np.arange(0.0, 1.0, 4 / q)[:, None]
         sides = [a + s * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
         return np.asarray(np.concatenate(sides) * half)
-    diameter = section.diameter if section.shape == "circle" else section.outer
     # Corner k at the angle of the rectangle's corner k, so that neighbors of other shape join without a twist.
     angle = 2 * np.pi * np.arange(q) / q - np.pi / 4
-    return np.asarray(0.5 * diameter * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+    return np.asarray(0.5 * section.outer * np.stack([np.cos(angle), np.sin(angle)], axis=1))

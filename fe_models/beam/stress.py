@@ -18,10 +18,10 @@ from ...common.arrays import Array, Integers
 from ..link_records.link import BeamLink
 from ..modal_body import Interface, Stations, StressPoint, craig_bampton
 from ..modal_body.attachment_modes import interface_loads
-from ..modal_body.interpolation import through
-from ..modal_body.lumped_masses import Lump, with_lumped_loads
+from ..modal_body.lumped_masses import Lump, lump_weights, with_lumped_loads
+from ..modal_body.parts import through
 from ..modal_body.unit_loads import interface_load_names, unit_load_names
-from .geometric_stiffness import ROTARY, of_load, of_tip_support, section_forces
+from .invariants import ROTARY, of_load, of_tip_support, section_forces
 from .section_stress import section_stress
 from .sections import Property
 
@@ -49,7 +49,7 @@ def beam_stresses(
     loads = list(loads_at.items())
     for lump in attached:
         motion = np.concatenate([lump.at.translation, lump.at.rotation])
-        loads.append((lump.name, lump.weights[:, None] * motion @ W))
+        loads.append((lump.name, lump_weights(lump.mass, lump.inertia)[:, None] * motion @ W))
     E, nu = link.material.youngs_modulus, link.material.poissons_ratio
     points, places = {}, {name: float(at.position[0]) for name, at in interfaces.items()}
     for name, position in link.stress.points.items():
@@ -106,5 +106,5 @@ def _of_inertia(link: BeamLink, stations: Stations, W: Array, x: float) -> Array
 
 
 def segments(link: BeamLink, x: Array) -> Integers:
-    """Number of the segment at each x; at a step of the section, of the one beyond it."""
+    """Number of the segment at each x, m, of any shape; at a step of the section, of the one beyond it."""
     return np.searchsorted(link.geometry.breakpoints[1:-1], x, side="right")

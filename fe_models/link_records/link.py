@@ -11,7 +11,6 @@ from ...common.validation import Record
 from ...mesh.records import (
     BeamGeometry,
     BeamMesh,
-    CircleSection,
     Outlines,
     PartTables,
     PlaceRecord,
@@ -19,7 +18,6 @@ from ...mesh.records import (
     SectionRecord,
     SolidGeometry,
     SolidMeshRecord,
-    TubeSection,
 )
 from .families import FAMILIES, HOLDING_ROOT, Family
 from .measured import Measured
@@ -251,7 +249,13 @@ class BeamLink(_Link):
     @property
     def sections(self) -> list[Section]:
         """Section properties of each segment. Without Poisson's ratio, J and k belong to ν = 0: nothing uses them."""
-        return [_properties(record, self.material.poissons_ratio or 0.0) for record in self.shapes]
+        nu = self.material.poissons_ratio or 0.0
+        return [
+            rectangle(record.height, record.width, nu)
+            if isinstance(record, RectangleSection)
+            else tube(record.outer, record.inner, nu)
+            for record in self.shapes
+        ]
 
     @property
     def places(self) -> dict[str, float]:
@@ -301,11 +305,3 @@ class SolidLink(_Link):
 Link = BeamLink | SolidLink
 LinkInScene = str | Link
 """Of a body: a link file, or its keys."""
-
-
-def _properties(record: RectangleSection | CircleSection | TubeSection, nu: float) -> Section:
-    if isinstance(record, RectangleSection):
-        return rectangle(record.height, record.width, nu)
-    if isinstance(record, CircleSection):
-        return tube(record.diameter, 0.0, nu)
-    return tube(record.outer, record.inner, nu)

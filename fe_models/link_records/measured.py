@@ -40,13 +40,17 @@ class MeasuredMode:
         return f"{self.family} {self.number}" if self.family else f"mode {self.number}"
 
 
-def read_measured(path: Path, families: tuple[str, ...] = ()) -> list[MeasuredMode]:
+def read_measured(path: Path, families: tuple[str, ...]) -> list[MeasuredMode]:
     """The rows of the CSV table at `path`; `families` are the names that its column `family` may have.
 
     Raises `InputError` naming file and line.
     """
     header, table = read_csv(path, "table of measured modes")
-    _check_header(path, header)
+    for name in header:
+        check_known(name, COLUMNS, f"{path}: line 1: expected columns among {quoted(COLUMNS)}")
+    if len(set(header)) < len(header) or "mode" not in header or not {"frequency", "damping_ratio"} & set(header):
+        columns = shown(",".join(header))
+        raise InputError(f"{path}: line 1: expected a header such as mode,frequency,damping_ratio", f"{columns!r}")
     rows = [_row(path, line, header, row, families) for line, row in table]
     if not rows:
         raise InputError(f"{path}: expected at least one measured mode below the header", "none")
@@ -56,15 +60,6 @@ def read_measured(path: Path, families: tuple[str, ...] = ()) -> list[MeasuredMo
             raise InputError(f"{path}: line {row.line}: expected each mode once", f"{row.label} again")
         seen.add((row.family, row.number))
     return rows
-
-
-def _check_header(path: Path, header: list[str]) -> None:
-    """Raise `InputError` unless the columns are known ones, `mode` and something measured among them."""
-    for name in header:
-        check_known(name, COLUMNS, f"{path}: line 1: expected columns among {quoted(COLUMNS)}")
-    if len(set(header)) < len(header) or "mode" not in header or not {"frequency", "damping_ratio"} & set(header):
-        columns = shown(",".join(header))
-        raise InputError(f"{path}: line 1: expected a header such as mode,frequency,damping_ratio", f"{columns!r}")
 
 
 def _row(path: Path, line: int, header: list[str], row: list[str], families: tuple[str, ...]) -> MeasuredMode:

@@ -76,25 +76,18 @@ def residual_modes(static: Mapping[Family, tuple[Array, Array]], X: Array, highe
     rad²/s², inf where there is none.
     """
     known, families = X, list[Family]()
-    largest = max((float(_energies(*pair, inertia).max(initial=0.0)) for pair in static.values()), default=0.0)
-    for family in FAMILIES:
-        if family in static:
-            shapes, loads = static[family]
-            own = _energies(shapes, loads, inertia)
-            moved = own > IMMOBILE * largest
-            if not moved.any():
-                continue
-            independent = _independent(shapes[:, moved] / np.sqrt(own[moved]), known, inertia)
+    energies = {family: inertia.total(np.einsum("il,il->l", *pair)) for family, pair in static.items()}  # bᵀK⁻¹b
+    largest = max((float(of.max(initial=0.0)) for of in energies.values()), default=0.0)
+    for family in (one for one in FAMILIES if one in static):
+        own = energies[family]
+        moved = own > IMMOBILE * largest
+        if moved.any():
+            independent = _independent(static[family][0][:, moved] / np.sqrt(own[moved]), known, inertia)
             families += [family] * independent.shape[1]
             known = np.concatenate([known, independent], axis=1)
     modes = _uncoupled(known[:, X.shape[1] :], families, inertia)
     count = int(np.searchsorted(modes.omega2, STIFFEST**2 * highest, side="right"))
     return ModeSet(modes.omega2[:count], modes.families[:count], modes.X[:, :count])
-
-
-def _energies(shapes: Array, loads: Array, inertia: Inertia) -> Array:
-    """(loads,) bᵀK⁻¹b."""
-    return inertia.total(np.einsum("il,il->l", shapes, loads))
 
 
 def _independent(shapes: Array, known: Array, inertia: Inertia) -> Array:
@@ -120,7 +113,7 @@ def _uncoupled(X: Array, families: Sequence[Family], inertia: Inertia) -> ModeSe
 
 
 def ascending(omega2: Array, family: Integers) -> Integers:
-    """Order (n,) of modes by ω² (n,), ties by family number (n,), so that round-off cannot decide."""
+    """Order (n,) of modes by ω² (n,) in rad²/s², ties by family number (n,), so that round-off cannot decide."""
     order = np.argsort(omega2, kind="stable")
     steps = np.diff(omega2[order]) > ALIKE * omega2[order][1:]
     level = np.concatenate([[0], np.cumsum(steps)])[: len(order)]
@@ -128,7 +121,7 @@ def ascending(omega2: Array, family: Integers) -> Integers:
 
 
 def uncoupled(K: Array, of: Integers) -> tuple[Array, Array, Integers]:
-    """Eigenvalues (n,), eigenvectors (n, n) and families (n,) of K (n, n) in coordinates of families `of` (n,)."""
+    """Eigenvalues (n,) rad²/s², eigenvectors (n, n), families (n,) of K (n, n) in coordinates of families `of` (n,)."""
     apart = of[:, None] != of
     size = np.sqrt(np.diag(K))
     if np.any(np.abs(K)[apart] > (COUPLED * np.outer(size, size))[apart]):

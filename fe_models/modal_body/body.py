@@ -11,8 +11,18 @@ import numpy as np
 
 from ...common.arrays import Array, Integers
 from ...common.errors import InputError
-from .interpolation import AlongAxis, interpolate
-from .parts import Frozen, Integrals, Interface, MeasuredValues, OutlinedPatches, PictureMesh, Stations, StressPoint
+from .parts import (
+    AlongAxis,
+    Frozen,
+    Integrals,
+    Interface,
+    MeasuredValues,
+    OutlinedPatches,
+    PictureMesh,
+    Stations,
+    StressPoint,
+    interpolate,
+)
 from .unit_loads import unit_load_names
 
 # m_ff = I and the identities between invariants must hold to this.
@@ -116,7 +126,8 @@ class ModalBody(Integrals, Frozen):
             object.__setattr__(self, "residual", np.zeros(len(self.family), dtype=np.int64))
         super().__post_init__()
         with np.errstate(all="ignore"):  # what is not finite is refused
-            _check(self)
+            for problem in _problems(self):
+                raise InputError(f"modal body {self.name}: {problem}")
 
     def __repr__(self) -> str:
         modes = f"{self.modes_in_words} of {self.frequency[0]:.5g} … {self.frequency[self.eigenmode_count - 1]:.5g} Hz"
@@ -167,80 +178,80 @@ class ModalBody(Integrals, Frozen):
         return interpolate(self.stations, x.clip(positions[0], positions[-1]))
 
 
-def _check(body: ModalBody) -> None:
-    """All that must hold of a modal body, in one place."""
+def _problems(body: ModalBody) -> Iterator[str]:
+    """What does not hold of a modal body; the first one counts."""
     k = body.stations.position.shape[0]
     for name, array, shape in _expected_shapes(body):
         if np.shape(array) != shape:
-            _fail(body, f"{name}: expected shape {shape}, found {np.shape(array)}")
+            yield f"{name}: expected shape {shape}, found {np.shape(array)}"
         if not np.all(np.isfinite(array)):
-            _fail(body, f"{name}: expected finite numbers, found NaN or infinity")
+            yield f"{name}: expected finite numbers, found NaN or infinity"
     for name in ("root", "tip"):
         if name not in body.interfaces:
-            _fail(body, f"interfaces: expected one named {name}, found {', '.join(body.interfaces) or 'none'}")
+            yield f"interfaces: expected one named {name}, found {', '.join(body.interfaces) or 'none'}"
     for name, value in (("length", body.length), ("mass", body.mass)):
         if not value > 0:
-            _fail(body, f"{name}: expected a positive number, found {value}")
+            yield f"{name}: expected a positive number, found {value}"
     if k < 2 or np.any(np.diff(body.stations.position[:, 0]) <= 0):
-        _fail(body, "stations.position: expected at least two, ascending in x")
+        yield "stations.position: expected at least two, ascending in x"
     first, last = body.stations.position[[0, -1], 0]
     if not first <= body.length / 2 <= last:
-        _fail(body, f"length: expected a middle between the first and the last station, found {body.length} m")
+        yield f"length: expected a middle between the first and the last station, found {body.length} m"
     element = body.stations.element
     if element is not None and not _is_chain(element, k):
-        _fail(body, "stations.element: expected four ascending stations for each element, from the first to the last")
+        yield "stations.element: expected four ascending stations for each element, from the first to the last"
     if np.any((body.residual != 0) & (body.residual != 1)) or np.any(np.diff(body.residual) < 0):
-        _fail(body, "residual: expected 0 of each eigenmode, then 1 of each residual attachment mode")
+        yield "residual: expected 0 of each eigenmode, then 1 of each residual attachment mode"
     unknown = [load for load in body.stress_loads if load not in unit_load_names(body.interfaces)]
     if unknown:
-        _fail(body, f"stress/loads: expected unit loads of the link and its interfaces, found {', '.join(unknown)}")
+        yield f"stress/loads: expected unit loads of the link and its interfaces, found {', '.join(unknown)}"
     if np.any(body.frequency <= 0):
-        _fail(body, "frequency: expected positive numbers")
+        yield "frequency: expected positive numbers"
     if np.any(body.damping_ratio < 0):
-        _fail(body, "damping_ratio: expected numbers not below 0")
-    _check_identities(body)
-    _check_inertia(body)
-    _check_spin(body)
-    _check_interfaces(body)
+        yield "damping_ratio: expected numbers not below 0"
+    yield from _identities(body)
+    yield from _inertia(body)
+    yield from _spin(body)
+    yield from _interfaces(body)
 
 
-def _check_inertia(body: ModalBody) -> None:
+def _inertia(body: ModalBody) -> Iterator[str]:
     """Kinetic energy is positive in every motion: about the center of mass, and with what the modes carry along."""
     second = body.second_moment - np.outer(body.first_moment, body.first_moment) / body.mass
     about_center = np.trace(second) * np.eye(3) - second  # inertia of a mass on an interface may be about z alone
     relative = body.modal_mass - body.S_bar.T @ body.S_bar / body.mass
     matrices = {"second_moment, as inertia about the center of mass": about_center, "modal_mass, less S_bar": relative}
     for name, matrix in matrices.items():
-        _check_positive(body, name, matrix, POSITIVE_TOLERANCE * np.abs(matrix).max(initial=0.0))
+        yield from _positive(name, matrix, POSITIVE_TOLERANCE * np.abs(matrix).max(initial=0.0))
 
 
-def _check_positive(body: ModalBody, name: str, matrix: Array, round_off: float) -> None:
+def _positive(name: str, matrix: Array, round_off: float) -> Iterator[str]:
     lowest = np.linalg.eigvalsh((matrix + matrix.T) / 2).min(initial=0.0)
     if lowest < -round_off:
-        _fail(body, f"{name}: expected no negative eigenvalue, found {lowest:.3g}")
+        yield f"{name}: expected no negative eigenvalue, found {lowest:.3g}"
 
 
-def _check_spin(body: ModalBody) -> None:
+def _spin(body: ModalBody) -> Iterator[str]:
     """Spin inertia is known whole or not at all; its energy is positive, and S_bar_33 holds that of the modes."""
     parts = {name: getattr(body, name) for name in ("J_spin", "h_spin", "S_spin")}
     missing = [name for name, value in parts.items() if value is None]
     if missing:
         if len(missing) < len(parts):
             known = ", ".join(name for name in parts if name not in missing)
-            _fail(body, f"{missing[0]}: expected together with {known}, found none")
+            yield f"{missing[0]}: expected together with {known}, found none"
         return
     J, h, S = parts.values()
     if not J >= 0:
-        _fail(body, f"J_spin: expected a number not below 0, found {J}")
+        yield f"J_spin: expected a number not below 0, found {J}"
     matrices = {
         "S_spin, less h_spinᵀ h_spin / J_spin": S - (np.outer(h, h) / J if J else np.abs(S) + np.outer(h, h)),
         "S_bar_kl[2, 2], less S_spin": body.S_bar_kl[2, 2] - S,
     }
     for name, matrix in matrices.items():
-        _check_positive(body, name, matrix, IDENTITY_TOLERANCE * np.abs(body.S_bar_kl[2, 2]).max(initial=0.0))
+        yield from _positive(name, matrix, IDENTITY_TOLERANCE * np.abs(body.S_bar_kl[2, 2]).max(initial=0.0))
 
 
-def _check_interfaces(body: ModalBody) -> None:
+def _interfaces(body: ModalBody) -> Iterator[str]:
     """Interfaces of a beam are points of its axis: they move as its stations do."""
     if body.kind != "beam" or body.stations.element is None:
         return
@@ -249,13 +260,10 @@ def _check_interfaces(body: ModalBody) -> None:
         for key, of_all in (("translation", body.stations.translation), ("rotation", body.stations.rotation)):
             error = np.max(np.abs(getattr(interface, key) - getattr(axis, key)), initial=0.0)
             if not np.isfinite(error) or error > INTERFACE_TOLERANCE * np.max(np.abs(of_all), initial=0.0):
-                _fail(
-                    body,
-                    f"interfaces/{name}/{key}: expected what stations say there, found a difference of {error:.2g}",
-                )
+                yield f"interfaces/{name}/{key}: expected what stations say there, found a difference of {error:.2g}"
 
 
-def _check_identities(body: ModalBody) -> None:
+def _identities(body: ModalBody) -> Iterator[str]:
     squares = (2 * np.pi * body.frequency) ** 2
     total = body.S_bar_kl[0, 0] + body.S_bar_kl[1, 1] + body.S_bar_kl[2, 2]
     identities = [
@@ -271,7 +279,7 @@ def _check_identities(body: ModalBody) -> None:
     for name, expected, left, right in identities:
         error = np.max(np.abs(left - right), initial=0.0)
         if not np.isfinite(error) or error > IDENTITY_TOLERANCE * np.max(np.abs(right), initial=0.0):
-            _fail(body, f"{name}: expected {expected} to {IDENTITY_TOLERANCE:g}, found a difference of {error:.2g}")
+            yield f"{name}: expected {expected} to {IDENTITY_TOLERANCE:g}, found a difference of {error:.2g}"
 
 
 def _expected_shapes(body: ModalBody) -> Iterator[tuple[str, Any, tuple[int, ...]]]:
@@ -308,7 +316,3 @@ def _is_chain(element: Integers, stations: int) -> bool:
         and bool(np.all(element[1:, 0] == element[:-1, 3]))
         and bool(element[0, 0] == 0 and element[-1, 3] == stations - 1)
     )
-
-
-def _fail(body: ModalBody, message: str) -> None:
-    raise InputError(f"modal body {body.name}: {message}")

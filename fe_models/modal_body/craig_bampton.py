@@ -32,7 +32,7 @@ def in_order(K: Array, families: Sequence[str], is_static: Sequence[bool]) -> Mo
     """Return modes in a basis X, XᵀMX = I, of fixed-interface modes and static shapes, in coordinates of the basis.
 
     Those that stand for eigenmodes, then as many of each family as loads brought, if the link couples them no more than
-    that. K (n, n) is XᵀKX; `families` and `is_static` are of the columns of X.
+    that. K (n, n) in rad²/s² is XᵀKX; `families` and `is_static` are of the columns of X.
     """
     names: list[str] = [*FAMILIES, LOCAL]
     of = np.array([names.index(family) for family in families])
@@ -87,7 +87,7 @@ def constraint_modes(omega2: Array, families: Sequence[str], interfaces: Mapping
 def interface_coordinates(
     omega2: Array, families: Sequence[str], static: int, interfaces: Mapping[str, Interface]
 ) -> InterfaceCoordinates:
-    """Return interface coordinates from ω² and families of n modes and the number of `static` shapes.
+    """Return interface coordinates from ω² (n,) in rad²/s² and families of n modes and the number of `static` shapes.
 
     Raises `InputError` for interfaces so near to each other that they cannot move by themselves.
     """
@@ -142,10 +142,10 @@ def craig_bampton(body: ModalBody) -> CraigBampton:
     omega2 = np.diag(body.stiffness)
     static = body.mode_count - body.eigenmode_count
     coordinates = interface_coordinates(omega2, body.family, static, body.interfaces)
-    rigid = np.array([_rigid_row(body, name) for name in coordinates.names]).reshape(-1, 6)
-    # A root beside the origin: the frame turns about it.
-    of_root = np.eye(6)
-    of_root[:3, 3:] = np.einsum("kab,b->ka", LEVI_CIVITA, -body.interfaces[ROOT].position)
+    carried = {name: _carried(at.position) for name, at in body.interfaces.items()}
+    parts = [name.split("/") for name in coordinates.names]
+    rigid = np.array([carried[name][AXES.index(component)] for name, component in parts]).reshape(-1, 6)
+    of_root = np.linalg.inv(carried[ROOT])  # a root beside the origin: the frame turns about it
     recovery = np.concatenate(
         [-coordinates.constraint @ rigid @ of_root, coordinates.constraint, coordinates.fixed], axis=1
     )
@@ -156,26 +156,18 @@ def craig_bampton(body: ModalBody) -> CraigBampton:
         turn[0] += body.h_spin  # of a line of mass, about itself
     coupling = np.concatenate([body.S_bar, turn])
     cross = frame.T @ coupling @ recovery
-    mass = frame.T @ _rigid_mass(body) @ frame + cross + cross.T + recovery.T @ recovery
+    J = np.trace(body.second_moment) * np.eye(3) - body.second_moment
+    J[0, 0] += body.J_spin or 0.0
+    of_first = np.einsum("akl,k->al", LEVI_CIVITA, body.first_moment)  # ∫ρ x × e_l dV, (rotation, translation)
+    rigid_mass = np.block([[body.mass * np.eye(3), of_first.T], [of_first, J]])
+    mass = frame.T @ rigid_mass @ frame + cross + cross.T + recovery.T @ recovery
     names = [f"{ROOT}/{axis}" for axis in AXES] + coordinates.names
     names += [f"mode/{k + 1}" for k in range(coordinates.fixed.shape[1])]
     return CraigBampton(names, mass, recovery.T @ (omega2[:, None] * recovery), recovery)
 
 
-def _rigid_row(body: ModalBody, coordinate: str) -> Array:
-    """(6,) an interface coordinate under unit motions of the frame."""
-    name, component = coordinate.split("/")
-    k = AXES.index(component)
-    if k >= 3:
-        return np.asarray(np.eye(6)[k])
-    turn = LEVI_CIVITA[k] @ body.interfaces[name].position  # (θ × x)_k = ε_kab θ_a x_b
-    return np.concatenate([np.eye(3)[k], turn])
-
-
-def _rigid_mass(body: ModalBody) -> Array:
-    """(6, 6) of the frame's translation and rotation."""
-    coupling = np.einsum("akl,k->al", LEVI_CIVITA, body.first_moment)  # ∫ρ x × e_l dV, (rotation, translation)
-    second = body.second_moment
-    J = np.trace(second) * np.eye(3) - second
-    J[0, 0] += body.J_spin or 0.0
-    return np.asarray(np.block([[body.mass * np.eye(3), coupling.T], [coupling, J]]))
+def _carried(x: Array) -> Array:
+    """(6, 6) motion of a point at x (3,), m, under unit translations and rotations of the frame."""
+    motion = np.eye(6)
+    motion[:3, 3:] = np.einsum("kab,b->ka", LEVI_CIVITA, x)  # θ × x
+    return motion

@@ -85,7 +85,7 @@ class KrylovSchur:
         return X
 
     def candidates(self, count: int) -> Array:
-        """Return the lowest modes; one of several equal ones may be missing, which `complete` finds.
+        """Return the lowest modes X (m, count), XᵀMX = I; one of several equal ones may lack: `complete` finds it.
 
         Raises `SolveError` where there are not as many but for round-off, or too few converge.
         """

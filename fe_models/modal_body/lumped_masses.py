@@ -36,18 +36,16 @@ class Lump:
     inertia: Array  # (3,) J_x, J_y, J_z about the interface, in kg·m²
 
     @property
-    def weights(self) -> Array:
-        """Weights (6,) m, m, m, J_x, J_y, J_z: M gains Bᵀ diag(weights) B, B (6, dofs) the motion of the interface."""
-        return lump_weights(self.mass, self.inertia)
-
-    @property
     def spread(self) -> Array:
         """E (3, 3) = ½ tr(J) I − J in kg·m²."""
         return np.diag(0.5 * self.inertia.sum() - self.inertia)
 
 
 def lump_weights(mass: float, inertia: Iterable[float]) -> Array:
-    """Return weights (6,) of the squared velocities and angular velocities of an interface, kg and kg·m²."""
+    """Return weights (6,) m, m, m, J_x, J_y, J_z, kg and kg·m², of an interface with motion B (6, dofs).
+
+    M gains Bᵀ diag(weights) B.
+    """
     return np.array([mass, mass, mass, *inertia])
 
 
@@ -118,7 +116,7 @@ def with_lumped_loads(of_loads: Mapping[str, Array], attached: Iterable[Lump]) -
 
 
 def with_lumped_stiffness(matrices: Mapping[str, Array], attached: Iterable[Lump]) -> dict[str, Array]:
-    """Geometric stiffness (n, n) by load with that of lumps: their inertia loads, and their points that turn."""
+    """Geometric stiffness (n, n) by unit load, N or N·m, with that of lumps: inertia loads, points that turn."""
     attached = list(attached)
     total = with_lumped_loads(matrices, attached)
     for lump in attached:

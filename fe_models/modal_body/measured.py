@@ -7,9 +7,7 @@ Stresses per unit of a mode go with its stiffness, so that those under a constan
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -17,9 +15,8 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ..link_records.families import FAMILIES
 from ..link_records.link import Link
-from ..link_records.measured import MeasuredMode, paired, read_measured
+from ..link_records.measured import paired, read_measured
 from .body import ModalBody
-from .damping import damping_ratio
 from .parts import MeasuredValues
 
 FARTHEST = 2.0  # times the computed frequency: beyond it the rows are of other modes, or the shapes of another link
@@ -37,17 +34,21 @@ def with_measured(body: ModalBody, link: Link) -> ModalBody:
     rows = dict(paired(read_measured(path, FAMILIES), body.family[: body.eigenmode_count]))
     if not rows:
         raise InputError(f"{path}: expected rows of modes that the link has ({body.modes_in_words})", "none")
-    frequency = body.frequency.copy()
+    frequency, flags = body.frequency.copy(), np.zeros((2, body.mode_count), dtype=np.int64)
     for k, row in rows.items():
+        flags[:, k] = row.frequency is not None, row.damping_ratio is not None
         if row.frequency is not None:
-            _check_distance(path, row, float(body.frequency[k]))
+            if not 1 / FARTHEST <= row.frequency / frequency[k] <= FARTHEST:
+                raise InputError(
+                    f"{path}: line {row.line}: frequency: expected {row.label} within a factor of {FARTHEST:g} of the"
+                    f" computed {frequency[k]:.6g} Hz",
+                    f"{row.frequency:g} Hz: is it another mode? (ffrobot fit brings the model nearer)",
+                )
             frequency[k] = row.frequency
     damping = damping_ratio(link, 2 * np.pi * frequency)
     for k, row in rows.items():
         damping[k] = damping[k] if row.damping_ratio is None else row.damping_ratio
-    values = MeasuredValues(
-        _flags(rows, "frequency", body.mode_count), _flags(rows, "damping_ratio", body.mode_count), body.frequency
-    )
+    values = MeasuredValues(flags[0], flags[1], body.frequency)
     return replace(_with_frequency(body, frequency), damping_ratio=damping, measured=values)
 
 
@@ -70,18 +71,31 @@ def _with_frequency(body: ModalBody, frequency: Array) -> ModalBody:
     )
 
 
-def _check_distance(path: Path, row: MeasuredMode, computed: float) -> None:
-    assert row.frequency is not None
-    if not 1 / FARTHEST <= row.frequency / computed <= FARTHEST:
-        raise InputError(
-            f"{path}: line {row.line}: frequency: expected {row.label} within a factor of {FARTHEST:g} of the computed"
-            f" {computed:.6g} Hz",
-            f"{row.frequency:g} Hz: is it another mode? (ffrobot fit brings the model nearer)",
-        )
+def damping_ratio(link: Link, omega: Array) -> Array:
+    """Return ζ (n,) as given, or of Rayleigh damping D = aM + bK: a/(2ω) + bω/2; `omega` (n,) is ω in rad/s.
+
+    A list is for the eigenmodes: its last number is that of the attachment modes, too.
+    """
+    if link.damping.rayleigh is not None:
+        a, b = link.damping.rayleigh
+        return a / (2 * omega) + b * omega / 2
+    ratio = np.asarray(link.damping.ratio or 0.0, dtype=np.float64)
+    if ratio.ndim:
+        ratio = np.pad(ratio, (0, omega.size - ratio.size), mode="edge")
+    return np.broadcast_to(ratio, omega.shape).copy()
 
 
-def _flags(rows: Mapping[int, MeasuredMode], what: str, count: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """(count,) 1 of the modes whose row has that value."""
-    flags = np.zeros(count, dtype=np.int64)
-    flags[[k for k, row in rows.items() if getattr(row, what) is not None]] = 1
-    return flags
+def canonical_signs(fields: Array) -> Array:
+    """Return factors 1 or −1 (n,) of each mode; `fields` (6, k, n): u, v, w (m), φ_x, φ_y, φ_z (rad), root first.
+
+    The dominant translation is then positive at the station nearest the root where it exceeds half its largest value;
+    of a mode without translation, the dominant rotation.
+    """
+    signs = np.ones(fields.shape[2])
+    for k in range(signs.size):
+        rows = fields[:3, :, k]
+        if not np.any(rows):
+            rows = fields[3:, :, k]
+        dominant = rows[np.argmax(np.abs(rows).max(axis=1))]
+        signs[k] = np.sign(dominant[np.argmax(np.abs(dominant) > 0.5 * np.abs(dominant).max())])
+    return signs

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ...common.arrays import Array
@@ -14,8 +16,10 @@ def stiffness(material: Material | OrthotropicMaterial) -> Array:
     Inverse of the compliance of Jones, Mechanics of Composite Materials (1999), eq. 2.26; isotropy is the case of equal
     constants. A solid's isotropic material has a Poisson's ratio: the link file has been checked for it.
     """
-    E, nu, G = _constants(material)
-    C = np.diag([0.0, 0.0, 0.0, G[1], G[2], G[0]])
+    E, nu = np.full(3, material.youngs_modulus), np.full(3, material.poissons_ratio)
+    of_shear = material.shear_modulus if isinstance(material, OrthotropicMaterial) else E / (2 * (1 + nu))
+    G_xy, G_yz, G_xz = of_shear
+    C = np.diag([0.0, 0.0, 0.0, G_yz, G_xz, G_xy])
     C[:3, :3] = np.linalg.inv(_normal_compliance(E, nu))
     return C
 
@@ -25,20 +29,7 @@ def is_stable(material: OrthotropicMaterial) -> bool:
     return bool(np.linalg.eigvalsh(_normal_compliance(material.youngs_modulus, material.poissons_ratio))[0] > 0)
 
 
-Triple = tuple[float, float, float]
-
-
-def _constants(material: Material | OrthotropicMaterial) -> tuple[Triple, Triple, Triple]:
-    """E_x, E_y, E_z; ν_xy, ν_yz, ν_xz; G_xy, G_yz, G_xz."""
-    if isinstance(material, OrthotropicMaterial):
-        return material.youngs_modulus, material.poissons_ratio, material.shear_modulus
-    E, nu = material.youngs_modulus, material.poissons_ratio
-    assert nu is not None
-    G = E / (2 * (1 + nu))
-    return (E, E, E), (nu, nu, nu), (G, G, G)
-
-
-def _normal_compliance(E: Triple, nu: Triple) -> Array:
+def _normal_compliance(E: Sequence[float] | Array, nu: Sequence[float] | Array) -> Array:
     """(3, 3) ε_xx, ε_yy, ε_zz under unit σ_xx, σ_yy, σ_zz, in 1/Pa."""
     return np.array(
         [

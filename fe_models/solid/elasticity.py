@@ -89,7 +89,7 @@ class SolidModel:
         return self.x.shape[0]
 
     def total(self, part: Array) -> Array:
-        """Sum of each rank's `part`; collective."""
+        """Sum of each rank's `part`, of any shape and unit; collective."""
         part = np.ascontiguousarray(part, dtype=np.float64)
         if self.comm.size == 1:
             return part
@@ -98,7 +98,7 @@ class SolidModel:
         return result
 
     def to_owners(self, parts: Array) -> Array:
-        """Return (r, owned) of (r, owned + ghosts): contributions of all processes to a node added; collective."""
+        """Return (r, owned) of (r, owned + ghosts), any unit: what all processes have for a node, added; collective."""
         if self.comm.size == 1:
             return parts
         seen = np.arange(parts.shape[1], dtype=PETSc.IntType)
@@ -113,7 +113,7 @@ class SolidModel:
         return result
 
     def with_ghosts(self, U: Array) -> Array:
-        """Extend U (3 owned, n) to (3 (owned + ghosts), n), ghosts from their owners; collective."""
+        """Extend displacements U (3 owned, n), m, to (3 (owned + ghosts), n), ghosts from their owners; collective."""
         if self.comm.size == 1:
             return U
         function = fem.Function(self.V)
@@ -131,7 +131,7 @@ class MassMatrix:
     `attached` has for each such mass B (6, 3 owned), the mean motion of its interface, and w (6,), its weights.
     """
 
-    def __init__(self, model: SolidModel, attached: Sequence[tuple[Array, Array]] = ()) -> None:
+    def __init__(self, model: SolidModel, attached: Sequence[tuple[Array, Array]]) -> None:
         self.model, self.attached = model, attached
 
     def __matmul__(self, U: Array) -> Array:
@@ -163,7 +163,10 @@ def solid_model(mesh: Mesh, order: int, materials: MaterialMap) -> SolidModel:
     owned = V.dofmap.index_map.size_local
     a, b = ufl.TrialFunction(S), ufl.TestFunction(S)
     rho = _cellwise(mesh, materials.density, materials.of_cell)
-    dx = ufl.dx(metadata={"quadrature_degree": mass_degree(mesh, order)})
+    geometry = mesh.geometry.cmap.degree
+    curved = 3 * (geometry - 1) if cell_name(mesh) == "tetrahedron" else 3 * geometry - 1
+    # Exact, but for curved cells of order beyond the second.
+    dx = ufl.dx(metadata={"quadrature_degree": 2 * order + curved})
     M = fem_petsc.assemble_matrix(compiled_form(rho * a * b * dx))
     M.assemble()
     mass, pattern = _scalar_mass(M, mesh.comm)
@@ -202,14 +205,8 @@ def stiffness_matrix(model: SolidModel, fixed: Sequence[Any] = ()) -> PETSc.Mat:
 def strain_degree(mesh: Mesh, order: int) -> int:
     """Degree of quadrature for products of two strains: exact on straight-sided cells."""
     geometry = mesh.geometry.cmap.degree
-    highest = order - 1 if _is_simplex(mesh) else order
+    highest = order - 1 if cell_name(mesh) == "tetrahedron" else order
     return 2 * highest + 2 * (geometry - 1)
-
-
-def mass_degree(mesh: Mesh, order: int) -> int:
-    """Degree of quadrature for products of two displacements: exact, but for curved order beyond the second."""
-    geometry = mesh.geometry.cmap.degree
-    return 2 * order + (3 * (geometry - 1) if _is_simplex(mesh) else 3 * geometry - 1)
 
 
 def voigt(gradient: ufl.core.expr.Expr) -> ufl.core.expr.Expr:
@@ -240,10 +237,6 @@ def _cellwise(mesh: Mesh, values: Array, of_cell: Integers) -> fem.Function:
     cells = node_map(function.function_space)[:, 0]
     function.x.array.reshape(-1, *values.shape[1:])[cells] = values[of_cell]
     return function
-
-
-def _is_simplex(mesh: Mesh) -> bool:
-    return cell_name(mesh) == "tetrahedron"
 
 
 def _scalar_mass(M: PETSc.Mat, comm: MPI.Comm) -> tuple[ScalarMass, tuple[Integers, Integers]]:

@@ -2,25 +2,33 @@
 
 Area-weighted averages about the centroid c of the face (the RBE3 convention): translation ∫u ds / A, and rotation
 θ = J⁻¹ ∫ r × u ds with r = x − c and J = ∫ (r·r I − r rᵀ) ds: the rigid motion nearest to u in the mean square. Both
-need no more than ∫N_a ds and ∫x N_a ds of each shape function N_a.
+need no more than ∫N_a ds and ∫x N_a ds of each shape function N_a. Work of patches on faces.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
 import ufl
 from dolfinx import fem
-from dolfinx.mesh import meshtags
+from dolfinx.mesh import Mesh, meshtags
+from mpi4py import MPI
 
 from ...common.arrays import Array
+from ...common.errors import SolveError
 from ...common.structs import struct
 from ...mesh.compat import compiled_form, function_space, lagrange_element, node_map
 from ...mesh.slices import section_quadratures
+from ...mesh.solid_mesh import MeshTags
+from ..link_records.link import SurfacePatches
+from ..modal_body import OutlinedPatches
 from ..modal_body.parts import LEVI_CIVITA
 from .elasticity import SolidModel
+
+AREA_TOLERANCE = 1e-9
 
 
 @struct
@@ -38,9 +46,9 @@ class Averages:
     density: Array  # (k,) mean density in kg/m³
 
     def of(self, model: SolidModel, modes: Array) -> tuple[Array, Array]:
-        """Return translation, m, and rotation, rad, (k, 3, n) of `modes` (3 (owned + ghosts), n); collective."""
+        """Return translation, m, and rotation, rad, (k, 3, n) of `modes` (3 owned, n); collective."""
         n = modes.shape[1]
-        moments = model.total(self.weights @ modes.reshape(-1, 3 * n)).reshape(-1, 4, 3, n)
+        moments = model.total(self.weights @ model.with_ghosts(modes).reshape(-1, 3 * n)).reshape(-1, 4, 3, n)
         translation = moments[:, 0] / self.area[:, None, None]
         # ∫ r × u = ∫ x × u − c × ∫u
         about_origin = np.einsum("abc,kbcn->kan", LEVI_CIVITA, moments[:, 1:])
@@ -48,7 +56,7 @@ class Averages:
         return translation, np.linalg.solve(self.inertia, about_origin - shift)
 
     def rows(self, model: SolidModel) -> Array:
-        """B (k, 6, 3 owned): translation and rotation as rows over this rank's own degrees of freedom; collective."""
+        """B (k, 6, 3 owned): translation, m, and rotation, rad, as rows over degrees of freedom; collective."""
         weights = model.to_owners(self.weights.toarray()).reshape(-1, 4, model.owned)
         result = np.zeros((weights.shape[0], 6, model.owned, 3))
         for axis in range(3):
@@ -59,12 +67,31 @@ class Averages:
         return result.reshape(-1, 6, 3 * model.owned)
 
 
-def face_averages(model: SolidModel, facet_tags: object, tags: Sequence[int]) -> Averages:
-    """Mean motion of the faces with the given `tags`; collective."""
-    parts = [_face_weights(model, facet_tags, tag) for tag in tags]
-    weights = sp.csr_matrix(np.concatenate([w for w, _ in parts]))
-    nothing = np.full((len(tags), 2), np.nan)
-    return _averages(model, weights, np.array([m for _, m in parts]), nothing, nothing, nothing[:, 0])
+def face_averages(model: SolidModel, facet_tags: MeshTags, tag: int) -> Averages:
+    """Mean motion of the face with the given `tag`; collective."""
+    mesh = model.mesh
+    ds = _on_face(mesh, facet_tags, tag, quadrature_degree=2 * mesh.geometry.cmap.degree + model.order)
+    select, other = fem.Constant(mesh, np.zeros(4)), fem.Constant(mesh, np.zeros(4))
+    x = ufl.SpatialCoordinate(mesh)
+    monomial, factor = (c[0] + sum(c[k + 1] * x[k] for k in range(3)) for c in (select, other))
+    load = compiled_form(monomial * ufl.TestFunction(function_space(mesh, model.order)) * ds)
+    moment = compiled_form(monomial * factor * ds)
+    weights, moments = [], np.zeros((1, 4, 4))
+    for row, unit in enumerate(np.eye(4)):
+        select.value[:] = unit
+        weights.append(fem.assemble_vector(load).array.copy())
+        for column, another in enumerate(np.eye(4)):
+            other.value[:] = another
+            moments[0, row, column] = fem.assemble_scalar(moment)
+    unknown = np.full((1, 2), np.nan)
+    return _averages(model, sp.csr_matrix(np.array(weights)), moments, unknown, unknown, unknown[:, 0])
+
+
+def _on_face(mesh: Mesh, facet_tags: MeshTags, tag: int, **metadata: int) -> ufl.Measure:
+    """The measure ds of the facets with a tag: their own set has tag 1, a number that is compiled into forms."""
+    facets = facet_tags.find(tag)
+    face = meshtags(mesh, 2, facets, np.ones(len(facets), dtype=np.int32))
+    return ufl.Measure("ds", domain=mesh, subdomain_data=face, metadata=metadata)(1)
 
 
 def section_averages(model: SolidModel, x: Array) -> Averages:
@@ -108,25 +135,41 @@ def _averages(
     )
 
 
-def _face_weights(model: SolidModel, facet_tags: object, tag: int) -> tuple[Array, Array]:
-    """Of this rank, ∫N, ∫xN, ∫yN, ∫zN over a face, (4, owned + ghosts), and of ∫ (1, x)ᵀ(1, x) ds."""
-    mesh = model.mesh
-    facets = facet_tags.find(tag)  # type: ignore[attr-defined]
-    # Tag 1 of a set of its own, so that one form serves all faces: its numbers are compiled into it.
-    face = meshtags(mesh, 2, facets, np.ones(len(facets), dtype=np.int32))
-    degree = 2 * mesh.geometry.cmap.degree + model.order
-    ds = ufl.Measure("ds", domain=mesh, subdomain_data=face, metadata={"quadrature_degree": degree})(1)
-    select = fem.Constant(mesh, np.zeros(4))
-    other = fem.Constant(mesh, np.zeros(4))
-    x = ufl.SpatialCoordinate(mesh)
-    monomial, factor = (c[0] + sum(c[k + 1] * x[k] for k in range(3)) for c in (select, other))
-    load = compiled_form(monomial * ufl.TestFunction(function_space(mesh, model.order)) * ds)
-    moment = compiled_form(monomial * factor * ds)
-    weights, moments = [], np.zeros((4, 4))
-    for row, unit in enumerate(np.eye(4)):
-        select.value[:] = unit
-        weights.append(fem.assemble_vector(load).array.copy())
-        for column, another in enumerate(np.eye(4)):
-            other.value[:] = another
-            moments[row, column] = fem.assemble_scalar(moment)
-    return np.array(weights), moments
+def outlined_patches(
+    space: fem.FunctionSpace,
+    facet_tags: MeshTags,
+    faces: Mapping[str, int],
+    record: SurfacePatches,
+    length: float,
+    modes: Array,
+    path: Path,
+) -> OutlinedPatches:
+    """Modal forces of piezoelectric patches outlined in the mesh; collective, the same on every process.
+
+    A patch that strains along the link loads the face beneath it by a membrane force N (N/m) along t = e_x: virtual
+    work ∫ N t·δε t ds. One whose width is fixed does the same along e_z, which bends the link back by ν: its N is
+    1/(1 − ν) times as large.
+
+    `faces` has the tags, among `facet_tags`, of "patch/K/top" and "patch/K/bottom", K from 0, where the record has
+    them; `length` (m) is that of the link, `modes` (dofs, n) with ghosts. Raises `SolveError` where the facets of a
+    patch do not fill its outline.
+    """
+    edges, mesh = record.edges(length), space.mesh
+    one, v, wanted = fem.Constant(mesh, 1.0), ufl.TestFunction(space), record.length * record.width
+    forces: dict[str, Array] = {}
+    for side in ("top", "bottom") if record.faces == "both" else (record.faces,):
+        rows: list[Array] = []
+        for k in range(len(edges)):
+            ds = _on_face(mesh, facet_tags, faces[f"patch/{k}/{side}"])
+            work = [fem.assemble_vector(compiled_form(v[axis].dx(axis) * ds)).array for axis in (0, 2)]
+            # What this process adds to others' degrees of freedom meets their ghosts in `modes`: the sum is complete.
+            own = np.append(np.array(work) @ modes, fem.assemble_scalar(compiled_form(one * ds)))
+            *row, area = mesh.comm.allreduce(own, op=MPI.SUM)
+            if not abs(area - wanted) <= AREA_TOLERANCE * wanted:
+                raise SolveError(
+                    f"{path}: surface_patch: the mesh does not follow the outline of patch {k + 1} on the {side} face: "
+                    f"its facets have {area:.9g} m2, length × width is {wanted:.9g} m2"
+                )
+            rows.append(np.reshape(row, (2, -1)))
+        forces[side], forces[f"{side}_across"] = np.stack(rows, axis=1)
+    return OutlinedPatches(np.array(edges), record.width, **forces)

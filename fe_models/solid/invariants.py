@@ -2,24 +2,34 @@
 
 With displacements and coordinates in the same space, every integral of docs/theory.md is a product with the scalar mass
 matrix: x is its own nodal interpolation, so nothing is lumped and nothing is approximated.
+
+An interface that turns by φ moves a point at d from its center by φ × d and, to second order, by ½ φ × (φ × d). Its
+mean displacement and rotation, which are linear in u, read the latter too: a section that turns about two axes across
+seems to turn about the third. The tractions t of a unit load on an interface do work on it, T = ∫ t dᵀ ds,
+
+    ∫ t · ½ φ × (φ × d) ds = ½ (φᵀ T φ − tr T φᵀφ)
+
+and −½ pᵀK p of the load, K = ∫ σ⁰ ∂Φ ∂Φ dV, is the work on both. Without it K belongs to the displacement of the
+interface's center and to the rotation vector of its section, by which the equations of motion place it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ...common.arrays import Array
+from ..modal_body import Interface
 from ..modal_body.parts import Invariants
 from ..modal_body.unit_loads import inertia_wrenches, interface_load_names
 from .elasticity import SolidModel
-from .strain_energy import geometric_stiffness, internal_forces
+from .stress import geometric_stiffness, internal_forces
 from .supports import Flexibility
 
 
 def shape_integrals(model: SolidModel, modes: Array) -> Invariants:
-    """Return the integrals of the part alone, of modes (3 owned, n), with spin inertia of the volume; collective."""
+    """Return the integrals, SI units, of the part alone, of `modes` (3 owned, n); its spin inertia is 0; collective."""
     n, x = modes.shape[1], model.x
     Phi = modes.reshape(-1, 3, n)
     M_Phi = (model.mass @ modes).reshape(-1, 3, n)
@@ -57,17 +67,75 @@ def unit_loads(model: SolidModel, interfaces: Mapping[str, Array]) -> dict[str, 
 
 
 def static_shapes(flexibility: Flexibility, loads: Mapping[str, Array]) -> dict[str, Array]:
-    """Return displacements (3 owned,) under each of the `unit_loads`, under the reference condition; collective."""
+    """Return displacements (3 owned,), m, under each of the `unit_loads`, by the reference condition; collective."""
     model = flexibility.model
     forces = np.stack(list(loads.values()), axis=1)
     displacements = flexibility @ forces
     # Bending stresses cancel over a section: the round-off errors of an assembled K, small as they are, would show.
-    displacements += flexibility @ (forces - internal_forces(model, model.with_ghosts(displacements)))
+    displacements += flexibility @ (forces - internal_forces(model, displacements))
     return dict(zip(loads, displacements.T, strict=True))
 
 
-def prestressed(model: SolidModel, modes: Array, shapes: Mapping[str, Array]) -> dict[str, Array]:
-    """Return geometric stiffness (n, n) by unit load of `modes` (3 owned, n), by its `static_shapes`; collective."""
-    displacements = np.stack(list(shapes.values()), axis=1)
-    matrices = geometric_stiffness(model, model.with_ghosts(modes), model.with_ghosts(displacements))
-    return dict(zip(shapes, matrices, strict=True))
+def prestressed(
+    flexibility: Flexibility,
+    modes: Array,
+    loads: Mapping[str, Array],
+    shapes: Mapping[str, Array],
+    *,
+    rows: Mapping[str, Array],
+    interfaces: Mapping[str, Interface],
+    supports: Mapping[str, Sequence[int]],
+) -> dict[str, Array]:
+    """Return geometric stiffness (n, n) of `modes` (3 owned, n) by unit load; collective.
+
+    It is that for centers and rotation vectors of the interfaces. `loads` and `shapes` (3 owned,) are nodal forces, N,
+    and displacements, m, by unit load, `rows` B (6, 3 owned) the mean motion of each interface, which spreads loads on
+    it. `supports`: components of the mean motion that are fixed, in the order of `flexibility.B`; none of rigid faces.
+    """
+    f, displacements = (np.stack([of[name] for name in loads], axis=1) for of in (loads, shapes))
+    total = geometric_stiffness(flexibility.model, modes, displacements)
+    T = _of_spread_loads(flexibility, list(loads), f, rows, interfaces, supports)
+    for name, more in _of_plates(flexibility, f, displacements).items():
+        T[name] += more
+    for name, t in T.items():
+        phi = interfaces[name].rotation
+        total += 0.5 * phi.T @ (t + t.transpose(0, 2, 1)) @ phi
+        total -= np.trace(t, axis1=1, axis2=2)[:, None, None] * (phi.T @ phi)
+    return dict(zip(loads, total, strict=True))
+
+
+def _of_spread_loads(
+    flexibility: Flexibility,
+    names: Sequence[str],
+    f: Array,
+    rows: Mapping[str, Array],
+    interfaces: Mapping[str, Interface],
+    supports: Mapping[str, Sequence[int]],
+) -> dict[str, Array]:
+    """T (loads, 3, 3) on each interface of what is spread by its rows: the load itself, reactions of mean supports."""
+    model, T = flexibility.model, {}
+    reactions = iter(flexibility.reactions(f))
+    for name, B in rows.items():
+        sizes = np.zeros((6, len(names)))
+        own = interface_load_names([name])
+        sizes[:, [names.index(load) for load in own]] = np.eye(6)
+        for component in supports.get(name, ()):
+            sizes[component] += next(reactions)
+        arms = model.x - interfaces[name].position
+        T[name] = np.einsum("kl,kij->lij", sizes, model.total(np.einsum("kai,aj->kij", B.reshape(6, -1, 3), arms)))
+    return T
+
+
+def _of_plates(flexibility: Flexibility, f: Array, shapes: Array) -> dict[str, Array]:
+    """T (loads, 3, 3) on rigid faces of the tractions that keep them plane, beside what is spread over them."""
+    model = flexibility.model
+    if not flexibility.faces:
+        return {}
+    constraint = internal_forces(model, shapes) - flexibility.supported(f)
+    at_nodes = constraint.reshape(model.owned, 3, -1)
+    return {
+        face.name: model.total(
+            np.einsum("ail,aj->lij", at_nodes[face.nodes], model.x[face.nodes] - face.centroid, optimize=True)
+        )
+        for face in flexibility.faces
+    }

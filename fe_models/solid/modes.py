@@ -1,36 +1,50 @@
-"""The modes that a link file asks for: the lowest of a family, however many others lie in between."""
+"""Modes of a solid: the lowest of a family, however many others lie in between; attachment modes; Craig–Bampton.
+
+Families go by the kinetic energy in the mean motion of the cross sections. Of a mode with unit modal mass, their
+translation (u, v, w) and rotation (φ_x, φ_y, φ_z) carry the shares
+
+    axial ∫ρA u² dx,  torsion ∫ρ(I_y + I_z) φ_x² dx,  in-plane bending ∫ρA v² + ρI_z φ_z² dx,  out-of-plane likewise.
+
+The largest names the family; where together they carry less than half, the mode is `local`.
+"""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, TypeAlias
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, Integers
 from ...common.errors import InputError, quoted
-from ..link_records.families import DEFAULT_COUNT, FAMILIES, LOCAL
+from ..link_records.families import DEFAULT_COUNT, FAMILIES, LOCAL, Family
 from ..link_records.link import SolidLink
-from ..modal_body.attachment_modes import ModeSet, ascending
+from ..modal_body.attachment_modes import COMPONENTS, Inertia, ModeSet, ascending, residual_modes
+from ..modal_body.craig_bampton import ROOT, in_order
 from ..modal_body.krylov_schur import KrylovSchur
-from .elasticity import MassMatrix
-from .families import NEARLY, SectionShapes, aligned, names
-from .strain_energy import strain_energy
+from ..modal_body.unit_loads import interface_load_names
+from .elasticity import MassMatrix, SolidModel
+from .functionals import Averages
+from .stress import strain_energy
+from .supports import Flexibility
 
-if TYPE_CHECKING:
-    from .attachment_modes import FixedInterfaceFlexibility
-    from .supports import Flexibility
-
-    Inverse: TypeAlias = Flexibility | FixedInterfaceFlexibility
-
-
-# Mean motion of the sections, of modes (3 owned, n).
-Reader = Callable[[Array], SectionShapes]
+# Relative distance up to which neighboring ω² are one repeated value.
+REPEATED = 1e-9
+# Where one family is wanted, modes this near are taken apart into it and the others.
+NEARLY = 1e-3
+# Simpson's 3/8 rule on the four stations of an element, exact for cubics.
+SIMPSON = np.array([1.0, 3.0, 3.0, 1.0]) / 8
+_DEFAULT = {str(family): count for family, count in DEFAULT_COUNT.items()}
 
 
-def wanted_modes(link: SolidLink, flexibility: Inverse, mass: MassMatrix, read: Reader, where: str) -> ModeSet:
-    """Compute the modes that `link.modes` selects; collective.
+def wanted_modes(
+    link: SolidLink,
+    flexibility: Flexibility | FixedInterfaceFlexibility,
+    mass: MassMatrix,
+    read: Callable[[Array], list[Array]],
+    where: str,
+) -> ModeSet:
+    """Compute the modes that `link.modes` selects; collective. `read`: `section_motion` of modes (3 owned, n), m.
 
     The search for the lowest modes goes on until the wanted ones are among them; for how many more follows from the
     share of wanted ones so far. Raises `InputError` for more than the mesh has, or than can be found in reasonable
@@ -63,15 +77,17 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: MassMatrix, read: 
             )
         sought = min(sought + batch, most)
         X = search.candidates(sought)
-        omega2, Q = np.linalg.eigh(strain_energy(model, model.with_ghosts(X)))
+        omega2, Q = np.linalg.eigh(strain_energy(model, X))
         X = X @ Q
         motion = read(X)
         Q = aligned(omega2, motion, family)
-        kinds = names(motion.turned(Q))
-        settled = available if sought == available else _settled(omega2)
+        kinds = names([rows @ Q for rows in motion])
+        # Of the modes found, those above the last gap may belong with one that is yet to be found.
+        gaps = np.flatnonzero(np.diff(omega2) > NEARLY * omega2[1:])
+        settled = available if sought == available else int(gaps.max(initial=-1)) + 1
         hits = [k for k, kind in enumerate(kinds[:settled]) if family == "all" or kind in family]
         if not numbers.size:
-            hits = _lowest_of_each(hits, kinds)
+            hits = [k for k in hits if kinds[:k].count(kinds[k]) < _DEFAULT.get(kinds[k], 0)]
         if len(hits) >= needed:
             if not search.complete(sought):
                 batch = 0
@@ -88,22 +104,6 @@ def wanted_modes(link: SolidLink, flexibility: Inverse, mass: MassMatrix, read: 
         batch = int(np.ceil((needed - len(hits)) / share)) + 2
 
 
-def _lowest_of_each(hits: Sequence[int], kinds: Sequence[str]) -> list[int]:
-    taken: Counter[str] = Counter()
-    chosen = []
-    for k in hits:
-        taken[kinds[k]] += 1
-        if kinds[k] in DEFAULT_COUNT and taken[kinds[k]] <= DEFAULT_COUNT[kinds[k]]:  # type: ignore[index]
-            chosen.append(k)
-    return chosen
-
-
-def _settled(omega2: Array) -> int:
-    """How many of the modes found lie below the last gap: the others may belong with one that is yet to be found."""
-    gaps = np.flatnonzero(np.diff(omega2) > NEARLY * omega2[1:])
-    return int(gaps[-1]) + 1 if gaps.size else 0
-
-
 def _chosen(omega2: Array, X: Array, Q: Array, kinds: Sequence[str]) -> ModeSet:
     """Modes X Q, uncoupled among each other."""
     K = (Q.T * omega2) @ Q
@@ -114,3 +114,119 @@ def _chosen(omega2: Array, X: Array, Q: Array, kinds: Sequence[str]) -> ModeSet:
         squares, turn = np.linalg.eigh(K)
         Q = Q @ turn
     return ModeSet(squares, tuple(kinds[k] for k in order), X @ Q)
+
+
+def section_motion(
+    averages: Averages,
+    x: Array,
+    element: Integers,
+    translation: Array,
+    rotation: Array,
+    attached: Sequence[tuple[Array, Array]],
+) -> list[Array]:
+    """Motion (rows, n) of the sections by family, in order of `FAMILIES`, whose sums of squares are kinetic energies.
+
+    Sections at x (k,), m, stations of `element` (e, 4), move by `translation` (k, 3, n), m, and `rotation`, rad;
+    `attached`: of each mass on an interface the motion there (6, n), and its weights (6,), kg and kg·m².
+    """
+    line = np.zeros(x.size)
+    np.add.at(line, element, (x[element[:, 3]] - x[element[:, 0]])[:, None] * SIMPSON)
+    mass, polar = line * averages.density * averages.area, np.einsum("kii->ki", averages.inertia)
+    turn = (line * averages.density)[:, None] * polar
+    lumps = [np.sqrt(weights)[:, None] * motion for motion, weights in attached]
+    moved = np.concatenate([np.sqrt(mass)[:, None, None] * translation, *(rows[None, :3] for rows in lumps)])
+    turned = np.concatenate([np.sqrt(turn)[:, :, None] * rotation, *(rows[None, 3:] for rows in lumps)])
+    bending = [np.concatenate([moved[:, axis], turned[:, about]]) for axis, about in ((1, 2), (2, 1))]
+    return [*bending, moved[:, 0], turned[:, 0]]
+
+
+def names(motion: Sequence[Array]) -> list[str]:
+    """Family of each mode, by the motion (rows, n) of the sections in each family."""
+    share = np.array([np.sum(rows**2, axis=0) for rows in motion])
+    total, first = share.sum(axis=0), share.argmax(axis=0)
+    return [FAMILIES[i] if whole >= 0.5 else LOCAL for whole, i in zip(total, first, strict=True)]
+
+
+def aligned(omega2: Array, motion: Sequence[Array], wanted: Sequence[str] | str) -> Array:
+    """Return Q (n, n), orthogonal, that rotates modes of equal frequency to the families: a reproducible basis.
+
+    `omega2` (n,) in rad²/s² is ascending, `motion` (rows, n) that of the sections by family. For `wanted` families (not
+    "all") modes of nearly equal frequency are turned too: into Ritz vectors, of which one has all that the cluster has
+    of a family.
+    """
+    Q = np.eye(omega2.size)
+    gap = REPEATED if wanted == "all" else NEARLY
+    ends = np.flatnonzero(np.append(np.diff(omega2) > gap * omega2[1:], True)) + 1
+    for first, last in pairwise([0, *ends]):
+        if last - first > 1:
+            Q[first:last, first:last] = _turn([rows[:, first:last] for rows in motion], wanted)
+    return Q
+
+
+def _turn(families: Sequence[Array], wanted: Sequence[str] | str) -> Array:
+    """(m, m): principal axes of the families' energies, each weighted by its number so that none are equal."""
+    weights = [4.0, 3.0, 2.0, 1.0]
+    if wanted != "all":
+        weights = [w * (name in wanted) for w, name in zip(weights, FAMILIES, strict=True)]
+    weights = [w / max(weights) if len(wanted) == 1 else w for w in weights]
+    energy = sum(weight * rows.T @ rows for weight, rows in zip(weights, families, strict=True))
+    return np.asarray(np.linalg.eigh(energy)[1][:, ::-1])
+
+
+def attachment_modes(
+    families: Sequence[Family],
+    mass: MassMatrix,
+    modes: ModeSet,
+    loads: Mapping[str, Array],
+    shapes: Mapping[str, Array],
+    interfaces: Sequence[str],
+    length: float,
+    twists_along: bool,
+) -> ModeSet:
+    """Return attachment modes of the loads that belong to `families`; collective.
+
+    `loads` (3 owned,), N, and `shapes`, m, by name are those of `invariants.unit_loads` and `static_shapes`; `mass` has
+    what is attached; `length` and `twists_along` as of `beam.modes.attachment_modes`.
+    """
+    model, scale = mass.model, np.repeat([1.0, length], 3)
+    static = {}
+    for family in families:
+        wanted = [
+            (name, scale[row])
+            for interface in interfaces
+            for row, name in enumerate(interface_load_names([interface]))
+            if row in COMPONENTS[family]
+        ]
+        if twists_along and family == "torsion":  # along the link as its inertia about the axis
+            turn = np.cross([1.0, 0.0, 0.0], model.x).ravel()
+            wanted.append(("r_x", length / float(model.total(np.array([turn @ loads["r_x"]]))[0])))
+        static[family] = tuple(np.stack([size * of[name] for name, size in wanted], axis=1) for of in (shapes, loads))
+    inertia = Inertia(lambda U: mass @ U, lambda U: strain_energy(model, U), model.total)
+    return residual_modes(static, modes.X, float(modes.omega2.max()), inertia)
+
+
+class FixedInterfaceFlexibility:
+    """F − F Bᵀ (B F Bᵀ)⁻¹ B F: displacements under loads with all interfaces fixed that `families` move.
+
+    F is the `flexibility` under the supports of the root, B the rows of `interfaces` (6, 3 owned) but the root in the
+    directions of the families. Vectors contain this rank's own degrees of freedom.
+    """
+
+    def __init__(self, flexibility: Flexibility, families: Sequence[Family], interfaces: Mapping[str, Array]) -> None:
+        moving = sorted({k for family in families for k in COMPONENTS[family]})
+        self._rows = np.concatenate([B[moving] for name, B in interfaces.items() if name != ROOT])
+        self._free, self.model = flexibility, flexibility.model
+        self.rank = flexibility.rank - len(self._rows)
+        self._shapes = flexibility @ np.ascontiguousarray(self._rows.T)
+        self._inverse = np.linalg.inv(self.model.total(self._rows @ self._shapes))
+
+    def __matmul__(self, loads: Array) -> Array:
+        """Displacements (3 owned, k), m, under loads (3 owned, k), N; collective."""
+        U = self._free @ loads
+        return np.asarray(U - self._shapes @ (self._inverse @ self.model.total(self._rows @ U)))
+
+
+def ritz_modes(model: SolidModel, both: ModeSet, count: int) -> ModeSet:
+    """Modes in the space of `count` fixed-interface modes and static shapes behind them, in that order; collective."""
+    ritz = in_order(strain_energy(model, both.X), both.families, [k >= count for k in range(len(both.families))])
+    return ModeSet(ritz.omega2, ritz.families, both.X @ ritz.X)

@@ -82,13 +82,16 @@ class Factors:
             used.destroy()
 
     def solve(self, loads: Array) -> Array:
-        """K⁻¹ f of loads (own, k), as many columns at once as MUMPS takes well; collective."""
+        """K⁻¹ f (own, k), m, of loads f (own, k), N, as many columns at once as MUMPS takes well; collective."""
         result = np.empty_like(loads)
         for start in range(0, loads.shape[1], COLUMNS):
             part = slice(start, start + COLUMNS)
             f = np.asfortranarray(loads[:, part])
             u = np.empty_like(f)
-            F, U = (self._dense(block) for block in (f, u))
+            size = self._sizes, (None, f.shape[1])
+            F, U = (PETSc.Mat().createDense(size, array=block, comm=self.matrix.comm) for block in (f, u))
+            F.assemble()
+            U.assemble()
             self.matrix.matSolve(F, U)
             F.destroy()
             U.destroy()
@@ -100,11 +103,6 @@ class Factors:
         self.matrix.destroy()
         if self._remove:
             self._remove()
-
-    def _dense(self, block: Array) -> PETSc.Mat:
-        matrix = PETSc.Mat().createDense((self._sizes, (None, block.shape[1])), array=block, comm=self.matrix.comm)
-        matrix.assemble()
-        return matrix
 
 
 def _fits(K: PETSc.Mat) -> bool:
@@ -154,24 +152,24 @@ class Flexibility:
         self.R = _plate(model.x, np.zeros(3)).reshape(-1, 6)
         self.B = B
         clamped = np.zeros((model.owned, 3), dtype=bool)
+        columns = [np.empty((3 * model.owned, 0))]  # of each face's nodes under its free unit motions, all else at rest
         for face in faces:
             clamped[face.nodes] = True
-        self.clamped = clamped.reshape(-1)
-        T = _plate_motions(model, faces)
+            motion = np.zeros((model.owned, 3, len(face.free)))
+            motion[face.nodes] = _plate(model.x[face.nodes], face.centroid)[:, :, list(face.free)]
+            columns.append(motion.reshape(3 * model.owned, -1))
+        self.clamped, T = clamped.reshape(-1), np.concatenate(columns, axis=1)
         KT = _times_stiffness(model, T) if T.shape[1] else T
-        self._factor = Factors(self._supported(faces))
+        if faces:
+            fixed = np.flatnonzero(model.with_ghosts(self.clamped[:, None].astype(np.float64))[::3, 0])
+            K = stiffness_matrix(model, [fem.dirichletbc(np.zeros(3), fixed.astype(np.int32), model.V)])
+        else:
+            K = stiffness_matrix(model)
+            _add_springs(model, K, self.R)
+        self._factor = Factors(K)
         self._condense(T, KT)
         if B is not None:
             self._BR_inverse = np.linalg.inv(model.total(B @ self.R))
-
-    def _supported(self, faces: Sequence[RigidFace]) -> PETSc.Mat:
-        """K_0."""
-        if faces:
-            fixed = np.flatnonzero(self.model.with_ghosts(self.clamped[:, None].astype(np.float64))[::3, 0])
-            return stiffness_matrix(self.model, [fem.dirichletbc(np.zeros(3), fixed.astype(np.int32), self.model.V)])
-        K = stiffness_matrix(self.model)
-        _add_springs(self.model, K, self.R)
-        return K
 
     def _condense(self, T: Array, KT: Array) -> None:
         """W and S⁻¹; where only mean supports hold the body, springs on the first face make S positive definite."""
@@ -188,7 +186,7 @@ class Flexibility:
         self._S_inverse = as_floats(np.linalg.inv(S))
 
     def __matmul__(self, loads: Array) -> Array:
-        """F f of loads (3 owned, k); collective."""
+        """F f (3 owned, k), m, of loads f (3 owned, k), N; collective."""
         f = self.supported(loads)
         U = self._factor.solve(np.where(self.clamped[:, None], 0.0, f))
         if self.W.shape[1]:
@@ -206,13 +204,13 @@ class Flexibility:
         self._factor.release()
 
     def reactions(self, loads: Array) -> Array:
-        """Return reactions (6, k) along the rows of B of mean supports under `loads` (3 owned, k); none if rigid."""
+        """Return reactions (6, k), N and N·m, along rows of B under `loads` (3 owned, k), N; none of rigid faces."""
         if self.B is None:
             return np.empty((0, loads.shape[1]))
         return np.asarray(-self._BR_inverse.T @ self.model.total(self.R.T @ loads))
 
     def supported(self, loads: Array) -> Array:
-        """Pᵀ f: `loads` with the forces of mean supports."""
+        """Pᵀ f (3 owned, k), N: `loads` with the forces of mean supports."""
         return loads if self.B is None else np.asarray(loads + self.B.T @ self.reactions(loads))
 
 
@@ -221,16 +219,6 @@ def _plate(x: Array, center: Array) -> Array:
     unit = np.eye(3)
     turns = [np.cross(axis, x - center) for axis in unit]
     return np.stack([*(np.broadcast_to(axis, x.shape) for axis in unit), *turns], axis=2)
-
-
-def _plate_motions(model: SolidModel, faces: Sequence[RigidFace]) -> Array:
-    """T (3 owned, m): each face's nodes under its free unit motions, all else at rest."""
-    columns = []
-    for face in faces:
-        motion = np.zeros((model.owned, 3, len(face.free)))
-        motion[face.nodes] = _plate(model.x[face.nodes], face.centroid)[:, :, list(face.free)]
-        columns.append(motion.reshape(3 * model.owned, -1))
-    return np.concatenate([np.empty((3 * model.owned, 0)), *columns], axis=1)
 
 
 def _times_stiffness(model: SolidModel, T: Array) -> Array:

@@ -10,9 +10,8 @@ from scipy.optimize import brentq
 
 from ffrobot.common.errors import SolveError
 from ffrobot.common.validation import validate
-from ffrobot.fe_models.beam.beam import family_model
-from ffrobot.fe_models.beam.dolfinx_forms import BeamForms
-from ffrobot.fe_models.beam.eigen import lowest_modes
+from ffrobot.fe_models.beam.beam import BeamForms, family_model
+from ffrobot.fe_models.beam.modes import lowest_modes
 from ffrobot.fe_models.link_records.link import BeamLink
 
 E, NU, RHO, LENGTH = 2.068427e11, 0.3, 7850.0, 1.0
@@ -47,7 +46,7 @@ def nodes_of(kind, elements, breakpoints=(0.0, LENGTH)):
 
 def frequencies(link, family, nodes, count=3):
     model = family_model(link, family, BeamForms(nodes), np.array([0.0, LENGTH]))
-    return np.sqrt(lowest_modes(model.K, model.M, model.strain, count)[0])
+    return np.sqrt(lowest_modes(model, count)[0])
 
 
 def observed_order(link, family, exact, kind, coarsest=10, levels=3, breakpoints=(0.0, LENGTH)):

@@ -8,10 +8,9 @@ import scipy.sparse as sp
 from scipy.linalg import eigh
 
 from ffrobot.common.validation import validate
-from ffrobot.fe_models.beam.beam import family_model
-from ffrobot.fe_models.beam.dolfinx_forms import BeamForms
-from ffrobot.fe_models.beam.eigen import lowest_modes
+from ffrobot.fe_models.beam.beam import BeamForms, family_model
 from ffrobot.fe_models.beam.line import gram, hermite, lagrange
+from ffrobot.fe_models.beam.modes import lowest_modes
 from ffrobot.fe_models.beam.sections import cellwise, rod_properties, second_moment
 from ffrobot.fe_models.link_records.families import FAMILIES
 from ffrobot.fe_models.link_records.link import BeamLink
@@ -75,7 +74,7 @@ def test_matrices_and_modes_are_those_of_closed_forms(family, theory, condition)
         scale = np.sqrt(np.outer(np.diag(closed), np.diag(closed)))
         np.testing.assert_allclose(assembled.toarray() / scale, closed / scale, rtol=0, atol=1e-12)
     theta, theirs = eigh(M, K)  # 1/ω²: the lowest modes without rounding of the highest
-    omega2, ours = lowest_modes(model.K, model.M, model.strain, 8)
+    omega2, ours = lowest_modes(model, 8)
     np.testing.assert_allclose(omega2, 1 / theta[:-9:-1], rtol=1e-10)
     overlap = ours.T @ M @ (theirs[:, :-9:-1] / np.sqrt(theta[:-9:-1]))
     np.testing.assert_allclose(np.abs(overlap), np.eye(8), rtol=0, atol=1e-8)

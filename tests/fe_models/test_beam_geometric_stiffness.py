@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ffrobot.fe_models.beam.geometric_stiffness import geometric_stiffness
+from ffrobot.fe_models.beam.invariants import geometric_stiffness
 from ffrobot.fe_models.beam.line import lagrange
 from ffrobot.fe_models.link_file import read_link
 from ffrobot.fe_models.modal_body.unit_loads import unit_load_names

@@ -24,6 +24,10 @@ def test_a_stepped_link_reads(link_file):
     assert link.material.poissons_ratio is None  # thin beams that bend need none
 
 
+SOLID = {'kind = "beam"': 'kind = "solid"', "elements = 20": ""}
+HOLE = "[[geometry.hole]]\ndiameter = 0.02\nposition = "
+
+
 # Words of the message, and what is replaced in the link or added to it. Types, ranges and unknown keys of any record:
 # tests/test_validation.py.
 WRONG = [
@@ -62,6 +66,8 @@ WRONG = [
     ("interface | a.b", {}, '[[interface]]\nname = "a.b"\nposition = 0.5'),
     ("interface.position of grip | 1.5", {}, '[[interface]]\nname = "grip"\nposition = 1.5'),
     ("interface.name | besides a, mid, found a", {}, '[[interface]]\nname = "a"\nposition = 0.5\n' * 2),
+    ("geometry.hole.position: expected holes within the length, 0 … 1 m, found 0.985 … 1.005", SOLID, HOLE + "0.995"),
+    ("geometry.hole.diameter: expected holes within ±0.0075 m of the axis, found -0.01 … 0.01", SOLID, HOLE + "0.5"),
     ("stress.surface: expected points, not a surface, on a beam, found true", {}, "[stress]\nsurface = true\n"),
     ("poissons_ratio: expected a value, for strains", {NU: ""}, "[stress]\npoints = { a = [0.5, 0.0, 0.0] }\n"),
 ]

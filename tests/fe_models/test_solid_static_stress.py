@@ -64,7 +64,7 @@ def clamped(path):
     root = fem.dirichletbc(np.zeros(3), fem.locate_dofs_geometrical(space, lambda x: np.isclose(x[0], 0.0)), space)
     K = fem_petsc.assemble_matrix(fem.form(ufl.inner(sigma, ufl.sym(ufl.grad(v))) * ufl.dx), bcs=[root])
     K.assemble()
-    tip = ufl.Measure("ds", domain=solid.mesh, subdomain_data=solid.facet_tags)(solid.faces["tip"])
+    tip = ufl.Measure("ds", domain=solid.mesh, subdomain_data=solid.facet_tags)(solid.part.faces["tip"])
     y = ufl.SpatialCoordinate(solid.mesh)[1]
     solver = PETSc.KSP().create(MPI.COMM_SELF)
     solver.setOperators(K)

@@ -10,8 +10,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ffrobot.common.errors import InputError, SolveError
+from ffrobot.fe_models.solid.functionals import outlined_patches
 from ffrobot.fe_models.solid.stress import locate, point_stresses, pulled_back, surface_stresses
-from ffrobot.fe_models.solid.surface_patches import outlined_patches
 from ffrobot.mesh.compat import create_solid_mesh, function_space, geometry_nodes
 
 

@@ -16,7 +16,13 @@ from ffrobot.mesh.mesh_files import read_foreign
 from ffrobot.mesh.records import PlaceRecord
 from ffrobot.mesh.structured import structured_box
 
-ENDINGS = ("step", "msh", "inp", "bdf", "vtk", "vtu")
+# Ending, content, and what is expected of it.
+CORRUPT = [
+    ("step", "", ".*"),
+    ("vtk", "", ".*"),
+    *((ending, "*NODE\n1, 0., 0.\n", ".*") for ending in ("msh", "inp", "bdf", "vtu")),
+    ("k", "*KEYWORD\n", r".* its ending is not one of \.step, .*"),
+]
 
 
 def structured_bar(cell, across=2):
@@ -24,14 +30,11 @@ def structured_bar(cell, across=2):
     return structured_box(1.0, (0.015, 0.025), (0.015, 0.025), (8, across, across), cell)
 
 
-@pytest.mark.parametrize(
-    ("ending", "content"),
-    [(ending, "" if ending in ("step", "vtk") else "*NODE\n1, 0., 0.\n") for ending in ENDINGS],
-)
-def test_corrupt_files_are_refused(solid, mesh_part, tmp_path, ending, content, capfd):
+@pytest.mark.parametrize(("ending", "content", "says"), CORRUPT)
+def test_corrupt_files_are_refused(solid, mesh_part, tmp_path, ending, content, says, capfd):
     path = tmp_path / f"part.{ending}"
     path.write_text(content)
-    with pytest.raises(InputError, match=rf"link.toml: geometry.file: part.{ending}: expected .*, found "):
+    with pytest.raises(InputError, match=rf"link.toml: geometry.file: part.{ending}: expected .*, found {says}"):
         mesh_part(solid(file=path))
     assert capfd.readouterr() == ("", "")
 
@@ -122,17 +125,18 @@ def test_partitions_of_gmsh(solid, mesh_part, tmp_path, partitions, binary):
     assert (list(part.regions), part.remarks) == (["bar"], ())
 
 
-def test_a_group_inside_the_part_is_no_face(solid, mesh_part, tmp_path):
-    path = write_mesh(tmp_path / "part.msh")
-    with pytest.raises(InputError, match=r"interface.group of hub: expected a face on the boundary .* not connected"):
-        mesh_part(solid(file=path, unit="mm"), (PlaceRecord(name="hub", group="joint"),))
-
-
-def test_a_missing_group_is_told_with_those_there(solid, mesh_part, tmp_path):
-    path = write_mesh(tmp_path / "part.msh")
-    says = r'groups of faces or nodes "joint", "left", found "lift" \(did you mean "left"'
+@pytest.mark.parametrize(
+    ("place", "keys", "says"),
+    [
+        ({"group": "joint"}, {}, r"interface.group of hub: expected a face on the boundary .* not connected"),
+        ({"group": "lift"}, {}, r'groups of faces or nodes "joint", "left", found "lift" \(did you mean "left"'),
+        ({}, {"size": 0.1}, r"mesh.size: expected none, since part.msh is a mesh, found 0.1"),
+    ],
+)
+def test_what_a_ready_mesh_does_not_have_is_refused(solid, mesh_part, tmp_path, place, keys, says):
+    geometry = solid(file=write_mesh(tmp_path / "part.msh"), unit="mm")
     with pytest.raises(InputError, match=says):
-        mesh_part(solid(file=path, unit="mm"), (PlaceRecord(name="hub", group="lift"),))
+        mesh_part(geometry, (PlaceRecord(name="hub" if place else "root", **place),), **keys)
 
 
 @pytest.mark.parametrize("ending", ["inp", "bdf", "vtk", "vtu", "med", "xdmf"])
@@ -185,7 +189,7 @@ def test_cells_that_meshio_leaves_out_are_not_dropped(tmp_path, monkeypatch):
     pyvista.UnstructuredGrid(dict(zip(kinds, cells, strict=True)), points).save(tmp_path / "part.vtu")
     monkeypatch.setitem(sys.modules, "pyvista", None)
     with pytest.raises(InputError, match="cells that meshio cannot handle"):
-        read_foreign(tmp_path / "part.vtu", "part")
+        read_foreign(tmp_path / "part.vtu")
 
 
 @pytest.mark.parametrize(("kind", "bend"), [("HEXAHEDRON", None), ("TETRAHEDRON", None), ("TETRAHEDRON", 0.3)])
@@ -215,12 +219,6 @@ def test_hidden_cells_of_vtk_are_rejected(solid, mesh_part, tmp_path):
     writer.Write()
     with pytest.raises(InputError, match="2 cells that vtkGhostType hides"):
         mesh_part(solid(file=tmp_path / "part.vtu"))
-
-
-def test_unknown_endings_are_named(solid, mesh_part, tmp_path):
-    (tmp_path / "part.k").write_text("*KEYWORD\n")
-    with pytest.raises(InputError, match=r"its ending is not one of \.step, "):
-        mesh_part(solid(file=tmp_path / "part.k"))
 
 
 def with_mid_sides(box, bend=0.0):
@@ -259,11 +257,6 @@ def test_curved_hexahedra_of_20_nodes_are_refused(solid, mesh_part, tmp_path):
         mesh_part(solid(file=tmp_path / "bent.vtu", unit="mm"))
 
 
-def test_keys_that_a_ready_mesh_leaves_no_use_for_are_refused(solid, mesh_part, tmp_path):
-    with pytest.raises(InputError, match=r"mesh.size: expected none, since part.msh is a mesh, found 0.1"):
-        mesh_part(solid(file=write_mesh(tmp_path / "part.msh"), unit="mm"), size=0.1)
-
-
 @pytest.mark.parametrize("number", [2147483648, -1, 81])
 def test_nodes_that_are_not_there_are_refused(solid, mesh_part, tmp_path, number):
     """In a VTK file of 81 nodes, which count from 0."""
@@ -290,10 +283,10 @@ def test_files_beside_a_mesh_count(solid, tmp_path, ending):
             values = "".join(f'<entity index="{k}" value="{size}"/>' for k in range(len(box.cells)))
             head = f'<mesh_function type="int" dim="3" size="{len(box.cells)}">'
             (tmp_path / "bar_parts.xml").write_text(f"<dolfin>{head}{values}</mesh_function></dolfin>")
-            assert set(read_foreign(path, "").regions) == {str(size)}
+            assert set(read_foreign(path).regions) == {str(size)}
         else:
             meshio.write(tmp_path / "bar.node", meshio.Mesh(points, [("tetra", cells)]))
-            found = read_foreign(path, "")
+            found = read_foreign(path)
             np.testing.assert_allclose(found.points, points)
             np.testing.assert_array_equal(found.blocks[0][1], cells)
         known.add(str(geometry_content(solid(file=path))))

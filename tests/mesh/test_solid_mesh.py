@@ -27,8 +27,8 @@ def test_faces_and_volume_by_dolfinx(solid, cell):
     x = ufl.SpatialCoordinate(body.mesh)
     assert total(one * ufl.dx(body.mesh)) == pytest.approx(0.000375)
     for name, area, first in (("root", 0.000375, 0.0), ("tip", 0.000375, 1.0), ("grip", 0.015, 0.5)):
-        assert total(one * ds(body.faces[name])) == pytest.approx(area)
-        assert total(x[0] * ds(body.faces[name])) == pytest.approx(area * first, abs=1e-12)
+        assert total(one * ds(body.part.faces[name])) == pytest.approx(area)
+        assert total(x[0] * ds(body.part.faces[name])) == pytest.approx(area * first, abs=1e-12)
 
 
 def test_curved_cells_by_dolfinx(solid):
