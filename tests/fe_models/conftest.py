@@ -55,7 +55,9 @@ def link_file(tmp_path):
 
 
 @pytest.fixture(autouse=True)
-def cache(tmp_path, monkeypatch):
-    """An empty cache folder in place of the user's."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    return tmp_path / "cache"
+def cache(request, tmp_path, tmp_path_factory, monkeypatch):
+    """A cache folder in place of the user's: empty, or one for all tests of a module with ONE_CACHE."""
+    is_shared = hasattr(request.module, "ONE_CACHE")
+    folder = tmp_path_factory.getbasetemp() / request.module.__name__ if is_shared else tmp_path / "cache"
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
+    return folder

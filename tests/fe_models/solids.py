@@ -1,41 +1,14 @@
 """Solid links for the tests, and what is known of them without the program's own eigensolver."""
 
 import numpy as np
+import tomli_w
+from beam_links import link_keys, rectangle
 from scipy.linalg import eigh
 
 from ffrobot.fe_models.link_file import read_link
 from ffrobot.fe_models.solid.elasticity import material_map, solid_model, stiffness_matrix
 from ffrobot.fe_models.solid.link import solid_modal_body
 from ffrobot.mesh.solid_mesh import solid_mesh
-
-SOLID = """
-name = "link1"
-
-[material]
-youngs_modulus = {E}
-poissons_ratio = 0.3
-density = {rho}
-
-[geometry]
-kind = "solid"
-length = {length}
-section = {{ shape = "rectangle", height = {height}, width = {width} }}
-
-[mesh]
-cell = "{cell}"
-order = {order}
-divisions = {divisions}
-
-[reference]
-condition = "{condition}"
-{coupling}
-
-[modes]
-count = {count}
-family = "{family}"
-attachment_modes = false
-{more}
-"""
 
 
 def write_solid(
@@ -50,14 +23,20 @@ def write_solid(
     divisions=(36, 1, 1),
     condition="simply-supported",
     coupling=None,
-    count=10,
-    family="in-plane-bending",
     more="",
+    material=None,
+    **modes,
 ):
     """Write a link file, the paper's link as a solid unless told otherwise, and return its path."""
-    values = locals() | {"coupling": f'coupling = "{coupling}"' if coupling else "", "divisions": list(divisions)}
+    mesh = f'[mesh]\ncell = "{cell}"\norder = {order}\ndivisions = {list(divisions)}\n'
+    modes = {"count": 10, "family": "in-plane-bending", "attachment_modes": False} | modes
+    keys = {"E": E, "nu": 0.3, "rho": rho, "condition": condition, "name": "link1", "modes": modes}
+    link = link_keys("solid", length, rectangle(height, width), {}, **keys)
+    del link["mesh"]
+    link["material"] |= material or {}
+    link["reference"] |= {"coupling": coupling} if coupling else {}
     path = folder / "link1.toml"
-    path.write_text(SOLID.format(**values))
+    path.write_text(tomli_w.dumps(link) + mesh + more)
     return path
 
 

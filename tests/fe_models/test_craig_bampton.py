@@ -20,6 +20,7 @@ from ffrobot.fe_models.modal_body.unit_loads import work_on_modes
 sys.path.append(str(Path(__file__).parents[1] / "mesh"))
 import decks
 
+ONE_CACHE = True  # one mesh, and each link once
 E, RHO, L, H, B = 2.0e11, 7800.0, 0.4, 0.06, 0.02
 EI, EA, MASS = E * B * H**3 / 12, E * B * H, RHO * B * H
 GRIP = {"name": "grip", "position": 0.25, "mass": 0.5, "inertia": [1e-3, 1e-3, 1e-3]}

@@ -9,6 +9,7 @@ import ffrobot
 from ffrobot.common.errors import InputError
 from ffrobot.present.info import describe
 
+ONE_CACHE = True  # one mesh
 RADIUS, PLACE = 0.006, 0.08
 # Condition, coupling of [reference] and of the pivot; whether the bore is a plate, and what root and tip are.
 CASES = [

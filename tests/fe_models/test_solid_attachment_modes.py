@@ -6,6 +6,7 @@ from beam_links import rectangle, solid_link
 
 import ffrobot
 
+ONE_CACHE = True  # each mesh once
 E, I_Z, I_Y, AREA, L = 2.1e11, 0.03 * 0.02**3 / 12, 0.02 * 0.03**3 / 12, 0.03 * 0.02, 0.4
 
 

@@ -8,7 +8,6 @@ from solids import body_of, write_solid
 import ffrobot
 from ffrobot.common.errors import InputError
 
-ISOTROPIC = "youngs_modulus = 206842700000.0\npoissons_ratio = 0.3\n"
 E, RHO = 2.0e11, 8000.0
 
 
@@ -27,11 +26,8 @@ def halves(folder, E_outer=4 * E, rho_outer=4 * RHO, group="outer"):
     }).body  # fmt: skip
 
 
-def orthotropic(path, E, nu, G):
-    text = path.read_text()
-    assert ISOTROPIC in text
-    path.write_text(text.replace(ISOTROPIC, f"youngs_modulus = {E}\npoissons_ratio = {nu}\nshear_modulus = {G}\n"))
-    return path
+def orthotropic(E, nu, G):
+    return {"youngs_modulus": E, "poissons_ratio": nu, "shear_modulus": G}
 
 
 def test_equal_constants_are_isotropy(tmp_path):
@@ -39,7 +35,8 @@ def test_equal_constants_are_isotropy(tmp_path):
     E, nu = 2.068427e11, 0.3
     options = {"divisions": (10, 1, 1), "count": 6, "family": "all"}
     plain = body_of(write_solid(tmp_path, **options))
-    same = body_of(orthotropic(write_solid(tmp_path, **options), [E] * 3, [nu] * 3, [E / 2 / (1 + nu)] * 3))
+    of = orthotropic([E] * 3, [nu] * 3, [E / 2 / (1 + nu)] * 3)
+    same = body_of(write_solid(tmp_path, **options, material=of))
     np.testing.assert_allclose(same.frequency, plain.frequency, rtol=1e-9)
     np.testing.assert_allclose(same.S_bar_kl, plain.S_bar_kl, rtol=0, atol=1e-7)
 
@@ -48,18 +45,9 @@ def test_each_family_has_its_own_modulus(tmp_path):
     """Wood-like: bending and axial modes go by E_x, torsion by G_xy and G_xz, and nothing by E_y, E_z, G_yz."""
     rho, height, width = 500.0, 0.02, 0.02
     E = [12.0e9, 0.6e9, 0.9e9]
-    path = write_solid(
-        tmp_path,
-        rho=rho,
-        height=height,
-        width=width,
-        divisions=(40, 4, 4),
-        order=2,
-        cell="hexahedron",
-        count=16,
-        family="all",
-    )
-    body = body_of(orthotropic(path, E, [0.0, 0.0, 0.0], [0.8e9, 0.1e9, 0.8e9]))
+    of = orthotropic(E, [0.0, 0.0, 0.0], [0.8e9, 0.1e9, 0.8e9])
+    section = {"height": height, "width": width, "cell": "hexahedron", "order": 2, "divisions": (40, 4, 4)}
+    body = body_of(write_solid(tmp_path, rho=rho, **section, count=16, family="all", material=of))
     found = dict(zip(reversed(body.family), reversed(body.frequency), strict=True))  # the lowest of each
     # Simply supported: π/2L² √(EI/ρA) without shear; rod 1/4L √(E/ρ); torsion 1/4L √(GJ/ρI_p), J = 0.1406 a⁴ (square).
     assert found["axial"] == pytest.approx(np.sqrt(E[0] / rho) / 4, rel=2e-3)

@@ -37,6 +37,18 @@ def mesh_part():
 
 
 @pytest.fixture
+def read(solid, mesh_part, tmp_path, request):
+    """The part that a deck describes, text or bytes; by default in the file `NAME` of the module."""
+
+    def make(deck, interfaces=(), name=None, **keys):
+        path = tmp_path / (name or request.module.NAME)
+        path.write_bytes(deck if isinstance(deck, bytes) else deck.encode())
+        return mesh_part(solid(file=path, **keys), interfaces)
+
+    return make
+
+
+@pytest.fixture
 def step_file(tmp_path):
     """A STEP file of what `build` makes of OpenCASCADE's kernel."""
 

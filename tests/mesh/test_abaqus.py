@@ -10,6 +10,7 @@ from ffrobot.mesh.abaqus import read_abaqus
 from ffrobot.mesh.included import files_of
 from ffrobot.mesh.records import PlaceRecord
 
+NAME = "part.inp"
 POINTS, CELLS = bar()
 PLAIN = nodes(POINTS) + elements(CELLS)
 TETRAHEDRA = nodes(POINTS) + elements(tetrahedra(CELLS), "C3D4")
@@ -19,18 +20,6 @@ SECOND = "*Instance, name=H-2, part=HALF\n0., 0.1, 0.\n*End Instance\n"
 TWO = PART + "*Instance, name=H-1, part=HALF\n*End Instance\n" + SECOND
 # Sides of the hexahedra: S5 looks along +y, S3 along −y, by the order of corners in decks.py.
 SURFACES = "*Surface, name=UP, type=ELEMENT\nH-1.E, S5\n*Surface, name=DOWN\nH-2.E, S3\n"
-
-
-@pytest.fixture
-def read(solid, mesh_part, tmp_path):
-    """The part that a deck describes."""
-
-    def make(text, interfaces=(), **keys):
-        path = tmp_path / "part.inp"
-        path.write_bytes(text if isinstance(text, bytes) else text.encode())
-        return mesh_part(solid(file=path, **keys), interfaces)
-
-    return make
 
 
 def moved_first(text):

@@ -3,6 +3,7 @@
 import tomllib
 
 import gmsh
+import meshio
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -56,8 +57,6 @@ def test_a_step_file(tmp_path):
 @pytest.mark.parametrize("order", [[0, 1, 2, 3, 4, 5, 6, 7], [3, 0, 1, 2, 7, 4, 5, 6]])
 def test_a_bar_of_hexahedra_that_twists(order, tmp_path):
     """By φ over its length, n cells of length L/n: each slice is an affine image, of area bh ((2 + cos φ/n)/3)."""
-    import meshio
-
     length, height, width, turn, count = 0.3, 0.04, 0.02, 1.2, 6
     bar = structured_box(length, (height, width), (height, width), (count, 2, 1), "hexahedron")
     x, y, z = bar.points.T
@@ -72,8 +71,6 @@ def test_a_bar_of_hexahedra_that_twists(order, tmp_path):
 @pytest.mark.parametrize("divisions", [(10, 1, 1), (12, 2, 1), (9, 3, 2)])
 def test_a_square_bar_gets_axes_along_its_faces(divisions, tmp_path):
     """Both transverse axes are principal, any is right. The draft has the density that is given, and its stiffness."""
-    import meshio
-
     bar = structured_box(0.4, (0.04, 0.04), (0.04, 0.04), divisions, "tetrahedron")
     meshio.Mesh(bar.points, [("tetra", bar.cells)]).write(tmp_path / "bar.vtk")
     part = inspect_part(tmp_path / "bar.vtk", "m")
@@ -116,8 +113,6 @@ def test_shafts_are_not_bores(tmp_path):
 @pytest.mark.parametrize(("bores", "length"), [(BORES, 0.25), ((), 0.3)])
 def test_a_draft_wherever_the_part_lies(bores, length, tmp_path):
     """A mesh, and the same turned and moved: links of one mass and one frequency, between bores or plane ends."""
-    import meshio
-
     plate(tmp_path / "plate.msh", bores, mesh=True)
     mesh = meshio.read(tmp_path / "plate.msh")
     turn = Rotation.from_rotvec([0.4, -0.7, 1.1]).as_matrix()

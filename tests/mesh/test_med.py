@@ -87,24 +87,18 @@ def test_curved_hexahedra_of_27_nodes(solid, mesh_part, tmp_path, mirror):
     assert integrate(part) == pytest.approx(1.1 * VOLUME, rel=1e-12)
 
 
-REJECTED = {
-    "cylindrical": ({"REP": 1}, "expected Cartesian coordinates, found cylindrical"),
-    "grid": ({"TYP": 1}, "expected a mesh of cells, found a structured grid"),
-    "plane": ({"ESP": 2}, "expected a mesh in 3D, found one in 2 dimensions"),
-}
-
-
-@pytest.mark.parametrize("what", REJECTED)
-def test_meshes_of_other_kinds(solid, mesh_part, tmp_path, what):
-    attributes, says = REJECTED[what]
-    path = write(tmp_path / "part.med", {"HE8": (HEXAHEDRA, None)}, **attributes)
+@pytest.mark.parametrize(
+    ("blocks", "attributes", "says"),
+    [
+        ({}, {"REP": 1}, "expected Cartesian coordinates, found cylindrical"),
+        ({}, {"TYP": 1}, "expected a mesh of cells, found a structured grid"),
+        ({}, {"ESP": 2}, "expected a mesh in 3D, found one in 2 dimensions"),
+        ({"POE": (HEXAHEDRA[:1], None)}, {}, "found POE"),
+    ],
+)
+def test_meshes_of_other_kinds(solid, mesh_part, tmp_path, blocks, attributes, says):
+    path = write(tmp_path / "part.med", {"HE8": (HEXAHEDRA, None)} | blocks, **attributes)
     with pytest.raises(InputError, match=says):
-        mesh_part(solid(file=path))
-
-
-def test_polyhedra_and_several_meshes(solid, mesh_part, tmp_path):
-    path = write(tmp_path / "part.med", {"HE8": (HEXAHEDRA, None), "POE": (HEXAHEDRA[:1], None)})
-    with pytest.raises(InputError, match="found POE"):
         mesh_part(solid(file=path))
     write(path, {"HE8": (HEXAHEDRA, None)}, name="other")
     with pytest.raises(InputError, match="expected one mesh, found 2: mesh, other"):

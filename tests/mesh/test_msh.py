@@ -8,6 +8,7 @@ from solid_parts import face_area, integrate
 from ffrobot.common.errors import InputError
 from ffrobot.mesh.records import PlaceRecord
 
+NAME = "part.msh"
 POINTS, CELLS = bar()
 LEFT = [(1, 2, 4, 3), (3, 4, 6, 5)]
 
@@ -33,15 +34,6 @@ def version_2(cells, groups, kind=5, binary=False, names=((3, 8, "all"), (3, 9, 
         for k, (of, group, cell) in enumerate(rows):
             text += f"{k + 1} {of} 2 {group} 1 {' '.join(str(10 * (node + 1)) for node in cell)}\n".encode()
     return text + b"\n$EndElements\n"
-
-
-@pytest.fixture
-def read(solid, mesh_part, tmp_path):
-    def make(content, interfaces=()):
-        (tmp_path / "part.msh").write_bytes(content)
-        return mesh_part(solid(file=tmp_path / "part.msh"), interfaces)
-
-    return make
 
 
 @pytest.mark.parametrize("binary", [False, True])
@@ -131,7 +123,7 @@ def test_scripts_do_not_run(read, tmp_path):
     sound = version_2(CELLS, [8] * 6)
     for text in (script, f"// mesh\n{script}", f"$Comments\n$EndComments\n{script}"):
         with pytest.raises(InputError, match=r"expected a mesh in gmsh's format, .* \$MeshFormat, found"):
-            read(text.encode())
+            read(text)
     (tmp_path / "part.msh.opt").write_text(script)
     assert integrate(read(sound)) == pytest.approx(VOLUME)
     fourth = b"$MeshFormat\n4.1 0 8\n$EndMeshFormat\n" + script.encode()

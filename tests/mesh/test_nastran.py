@@ -9,20 +9,10 @@ from ffrobot.common.errors import InputError
 from ffrobot.mesh.included import files_of
 from ffrobot.mesh.records import PlaceRecord
 
+NAME = "part.bdf"
 POINTS, CELLS = bar()
 PLAIN = free(POINTS, CELLS)
 HEAD = "SOL 103\nCEND\nTITLE = GRID of a bar\nBEGIN BULK\n"
-
-
-@pytest.fixture
-def read(solid, mesh_part, tmp_path):
-    """The part that a deck describes."""
-
-    def make(text, interfaces=(), name="part.bdf", **keys):
-        (tmp_path / name).write_bytes(text.encode())
-        return mesh_part(solid(file=tmp_path / name, **keys), interfaces)
-
-    return make
 
 
 def marked(text):
