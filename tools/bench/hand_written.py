@@ -35,7 +35,7 @@ def evaluation_seconds(state: State, t: float, evaluations: int) -> float:
 
 def targets(system: MultibodySystem, t: float) -> Array:
     """Second derivatives that the core's rows follow at time t (rows,)."""
-    return system.row_signs * [0.0 if row.target is None else row.target(t)[2] for row in system.model.rows]
+    return system.model.row_signs * [0.0 if row.target is None else row.target(t)[2] for row in system.model.rows]
 
 
 def ratios(seconds: Sequence[float], beside: Sequence[float]) -> tuple[float, float]:
@@ -107,4 +107,12 @@ def general_state(model: Model) -> State:
         q[node.p_q] = [next(bend) for _ in range(node.body.n_modes)]
     found = model.constraints.posture(q, TIME)
     assert found is not None
-    return MultibodySystem(model), found, model.constraints.velocities(found, v, TIME)
+
+    def rates(v: Array) -> Array:
+        """Ċ (rows,) there, linear in v."""
+        return model.constraints.rates(found[None], v[None], np.array([TIME]))[0]
+
+    joints = [k for node in model.tree.nodes for k in range(node.v.start, node.v.stop)]
+    gradients = np.column_stack([rates(unit) - rates(v) for unit in np.eye(len(v))[joints]])
+    v[joints] = np.linalg.lstsq(gradients, -rates(v), rcond=None)[0]
+    return MultibodySystem(model), found, v
