@@ -9,7 +9,7 @@ import pytest
 import tomli_w
 from beam_links import beam_link, rectangle
 from rich.console import Console
-from tables_3d import ORIGIN, Y, Z, joint, revolute, rigid, scene
+from tables_3d import ORIGIN, Y, Z, joint, pin, planar, revolute, rigid, scene
 
 from ffrobot import solve
 from ffrobot.batch.batch import batch_of
@@ -249,9 +249,8 @@ def test_a_straight_arm_reaches_what_its_links_reach(tmp_path, over):
     """Places from 0.2 to 1 m, from a start that is straight, or that no neighbor leads from across the hole."""
     bodies = [two_dimensional("a", 2.0, 0.05, 0.6), two_dimensional("b", 1.0, 0.02, 0.4)]
     limit = {"position_limit": [-3.2, 0.1]}
-    joints = [joint("s", "revolute", "ground", "a.root"), joint("e", "revolute", "a.tip", "b.root", **limit)]
-    path = written(tmp_path, scene(bodies, joints, REST, space="planar", gravity=[0.0, -9.81]))
-    found = mapped(path, tmp_path / "map", *over)
+    joints = [pin("s", "ground", "a.root"), pin("e", "a.tip", "b.root", **limit)]
+    found = mapped(written(tmp_path, planar(bodies, joints, REST)), tmp_path / "map", *over)
     x, y = np.meshgrid(*(axis.values for axis in found.plan.axes), indexing="ij")
     distance = np.hypot(x, y).ravel()
     assert (found.status == np.where((distance > 0.2 - 1e-9) & (distance < 1.0 + 1e-9), 0, 1)).all()
