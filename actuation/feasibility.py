@@ -1,4 +1,4 @@
-"""Can these actuators do it? What is required of patches and motors against what they have, and what would do."""
+"""Feasibility: requirements on patches and motors against their limits, and single changes that would suffice."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from ..mbs.model.motors import split_forces
 from ..mbs.quantities.motion import modal_coordinates, node_of, point_names
 from ..mbs.quantities.supply import actuator_forces, motors_fit
 from ..mbs.run.record import Run
-from ..mbs.scene.analysis import Analysis
 from .motors import MotorFeasibility, first_time, judge_motors
 
 if TYPE_CHECKING:
@@ -30,26 +29,26 @@ if TYPE_CHECKING:
 
 ROWS = 50  # of a run at which mass matrices are made, and at twice as many around the largest shift
 KEPT = 1.0 + 1e-6  # times limits of rates: more is beyond them
-RINGING = 2.0  # times the static shift, of a force that is missing all at once
+NEGLIGIBLE = 1e-6  # of the length of a link, of a deflection; rad
+ROUND_OFF = 1e-6  # of the largest modal force: less is what ill-conditioned patches leave
 
 
 @struct
 class Unsupplied:
     """Path error of motors and patches that cannot supply the modal forces of a path."""
 
-    bodies: tuple[str, ...]  # links without patches or points, or with too few, for the modal forces that were found
+    bodies: tuple[str, ...]  # links without patches or points, or with too few, for the modal forces required
     with_patches: bool  # whether any link has patches
-    point: str = ""  # of a trajectory (of any body where trajectories are of angles), the one that misses most
-    # m, largest distance from the path where the motors keep the angles that were found, quasi-static
+    point: str = ""  # of a trajectory (of any body where trajectories are of angles), with the largest error
+    # m, largest distance from the path where the motors keep the computed angles, quasi-static
     angles_kept: float = 0.0
-    at_start: float = 0.0  # m, likewise at the first output: what the links sag by
-    # m, likewise where they repeat the moments that were found: the first vibration. The robot drifts away from there,
-    # which no quasi-static estimate knows
+    at_start: float = 0.0  # m, likewise at the first output: the sag of the links
+    # m, likewise where they repeat the computed torques: the first vibration, without the drift that follows
     moments_repeated: float = 0.0
-    # 1/s, of deviations under these moments (`open_loop_growth`); 0 where none grows, nan if unknown
+    # 1/s, of deviations under these torques (`open_loop_growth`); 0 where none grows, nan if unknown
     growth: float = 0.0
-    families: tuple[str, ...] = ()  # in 3D, of each body, those of the modes concerned, in words
-    # in 3D, m, of each, the largest of a point by Φ K⁻¹ r, quasi-static, the link held as its modes are
+    families: tuple[str, ...] = ()  # in 3D, of each body, those of the modes concerned
+    # in 3D, m, of each body, the largest of a point by Φ K⁻¹ r, quasi-static, with the supports of its modes
     deflection: tuple[float, ...] = ()
     rotation: tuple[float, ...] = ()  # in 3D, rad, likewise, of a section
 
@@ -62,7 +61,8 @@ class Unsupplied:
     def in_words(self) -> str:
         """Explanation and remedies as text."""
         links = [
-            f"{body} ({families}), off by {_length(deflection)}{_turn(turn)}"
+            f"{body} ({families}), off by {_length(deflection)}"
+            + (f" and {np.degrees(turn):.2g}°" if turn > NEGLIGIBLE else "")
             for body, families, deflection, turn in zip(
                 self.bodies, self.families, self.deflection, self.rotation, strict=True
             )
@@ -78,10 +78,10 @@ class Unsupplied:
 
 
 def quasi_static_shift(run: Run, modal: Mapping[str, Array], points: Iterable[str]) -> dict[str, Array]:
-    """Shift (T, 3), m, global axes, of points under modal forces r (T, n) by body, motors locked.
+    """Return the shift (T, 3), m, global axes, of points by name under modal forces r (T, n), N/√kg, by body.
 
-    To first order, and slowly: δp = −K⁻¹ r and δr = (∂r/∂p) δp. Vibration that a sudden lack of force starts can be
-    twice as large. ∂r/∂p with motors at rest is what a unit force on the point takes of modes (virtual work).
+    With motors locked, to first order and quasi-static: δp = −K⁻¹ r and δr = (∂r/∂p) δp. The vibration after a sudden
+    lack of force can be twice as large.
     """
     shift, _ = _locked(run, modal)
     places = run.model.tree.places(run.q, shift)
@@ -89,10 +89,10 @@ def quasi_static_shift(run: Run, modal: Mapping[str, Array], points: Iterable[st
 
 
 def freed_shift(run: Run, modal: Mapping[str, Array], point: str, rows: Indices) -> Array:
-    """Return the shift (T, 3), m, of a point at these rows if motors keep their torques: the robot recoils by γ.
+    """Return the shift (len(rows), 3), m, of a point at some outputs if motors keep their torques: the robot recoils.
 
-    δq = δq_locked + R γ with Rᵀ M δq = 0, R = ∂q/∂γ: unmet modal forces do no work while p stands still,
-    and no momentum comes from within.
+    Under modal forces (T, n), N/√kg, by body: δq = δq_locked + R γ with Rᵀ M δq = 0, R = ∂q/∂γ, as no momentum comes
+    from within.
     """
     shift, R = _locked(run, modal, rows)
     MR = mass_matrices(run.model, run.q[rows]) @ R
@@ -101,13 +101,13 @@ def freed_shift(run: Run, modal: Mapping[str, Array], point: str, rows: Indices)
     return tree.places(run.q[rows], freed).at(tree.section(point)).velocity
 
 
-def seen_at_points(about: Unsupplied, run: Run, modal: Mapping[str, Array], points: Iterable[str]) -> Unsupplied:
-    """Add the shift (m) of points by unmet modal forces r (T, n), N/√kg; `point`: the one with the largest error."""
+def _seen_at_points(about: Unsupplied, run: Run, modal: Mapping[str, Array], points: Iterable[str]) -> Unsupplied:
+    """`about` with the shift of the point that has the largest error by unmet modal forces (T, n), N/√kg."""
     shift = {name: np.linalg.norm(shifts, axis=1) for name, shifts in quasi_static_shift(run, modal, points).items()}
     point = max(shift, key=lambda name: float(shift[name].max()))
     kept, step = shift[point], max(1, len(run.time) // ROWS)
     parts = np.array_split(np.arange(len(kept)), min(ROWS, len(kept)))
-    coarse = np.array([rows[kept[rows].argmax()] for rows in parts])  # what rings peaks between evenly spaced rows
+    coarse = np.array([rows[kept[rows].argmax()] for rows in parts])  # vibration peaks between evenly spaced rows
     top = coarse[np.linalg.norm(freed_shift(run, modal, point, coarse), axis=1).argmax()]
     near_top = np.unique(np.linspace(max(0, top - step), min(len(run.time) - 1, top + step), 2 * ROWS).astype(int))
     freed = np.linalg.norm(freed_shift(run, modal, point, near_top), axis=1)
@@ -116,14 +116,14 @@ def seen_at_points(about: Unsupplied, run: Run, modal: Mapping[str, Array], poin
         point=point,
         angles_kept=float(kept.max()),
         at_start=float(kept[0]),
-        moments_repeated=RINGING * float(freed.max()),
+        moments_repeated=2.0 * float(freed.max()),  # vibration after a sudden lack of force
     )
 
 
 def _locked(run: Run, modal: Mapping[str, Array], rows: Indices | slice = slice(None)) -> tuple[Array, Array]:
-    """δq (T, n_v) by −K⁻¹ r of modes where motors stand still, and R = ∂q/∂γ (T, n_v, motors) where they turn by γ.
+    """δq (T, n_v) by −K⁻¹ r of modes with motors locked, and R = ∂q/∂γ (T, n_v, motors) by motor angles γ.
 
-    By virtual work: what modes and motors take of a unit force along each joint coordinate; modes take their own.
+    By virtual work: the parts of a unit force along each joint coordinate on modes and on motors.
     """
     tree, q = run.model.tree, run.q[rows]
     joints = np.flatnonzero(tree.joint_columns)
@@ -143,15 +143,6 @@ def _length(value: float) -> str:
     return f"{1e3 * value:.2g} mm"
 
 
-def _turn(angle: float) -> str:
-    """Nothing of a section that turns by round-off only."""
-    return f" and {np.degrees(angle):.2g}°" if angle > ROUND_OFF else ""
-
-
-ROUND_OFF = 1e-12  # rad
-MOST_PATCHES = 200  # that are tried on one link
-
-
 @struct
 class Remedies:
     """Single changes with which the patches suffice; infinite or 0 if there is none."""
@@ -159,32 +150,28 @@ class Remedies:
     limit: float  # largest voltage, V, of the patch that needs most
     layers: int  # number of layers of the same thickness, at the same voltage
     thickness: float  # of one layer, m, with the voltage raised in proportion (at the same field)
-    # patches of the same size, evenly spread; 0 where even as many as have room do not do, or none are tried
-    count: int
-    most_count: int  # as many as have room
-    most_factor: float  # by how much those still fall short
+    count: int  # patches of the same size, evenly spread; 0 where no number with room suffices, or none are tried
+    most_count: int  # the largest number with room
+    most_factor: float  # ratio of required to available voltage with these
 
 
 @struct
 class PatchFeasibility:
     """Requirements on the patches of one body in one analysis; k patches, n modes, peaks over time."""
 
-    # required_moment, available_moment: (k,) N·m, c times the required voltage, c times the limit
-    required_moment: Array
-    available_moment: Array
+    required_moment: Array  # (k,) N·m, c times the required voltage
+    available_moment: Array  # (k,) N·m, c times the limit
     saturation_time: Array  # (k,) s, when a limit is first exceeded; NaN where none is
-    # slew, current: (k,) V/s and A, largest of the required voltage, means between outputs, and what amplifiers have
-    slew: Array
-    slew_limit: Array
-    current: Array
-    current_limit: Array
+    slew: Array  # (k,) V/s, largest of the required voltage, mean between outputs
+    slew_limit: Array  # (k,) V/s
+    current: Array  # (k,) A, largest at the required voltage, mean between outputs
+    current_limit: Array  # (k,) A
     field: Array  # (k,) V/m in a layer at the required voltage
     limited_field: Array  # (k,) V/m at the voltage within the limit
     strain: Array  # (k,) of the outer surface, from the bending of the link, its mean along the patch
-    # mode_required, mode_available: (n,) N/√kg, modal forces: wanted, and with every patch at its limit
-    mode_required: Array
-    mode_available: Array
-    find_remedies: Callable[[], Remedies]  # finds `remedies`
+    mode_required: Array  # (n,) N/√kg, largest modal force
+    mode_available: Array  # (n,) N/√kg, modal force with every patch at its limit
+    find_remedies: Callable[[], Remedies]
 
     @cached_property
     def remedies(self) -> Remedies:
@@ -199,9 +186,9 @@ class PatchFeasibility:
 
     @property
     def mode_factor(self) -> Array:
-        """Ratio (n,) of required to available modal force; above 1 no voltages within limits reach it, even alone.
+        """Ratio (n,) of required to available modal force; above 1 no voltages within limits suffice, even alone.
 
-        Infinite where no patch reaches the mode, 0 where nothing is required of it.
+        Infinite where no patch reaches the mode, 0 where no force is required.
         """
         without = np.where(self.mode_required > 0, np.inf, 0.0)
         return np.divide(self.mode_required, self.mode_available, out=without, where=self.mode_available > 0)
@@ -209,10 +196,9 @@ class PatchFeasibility:
 
 @struct
 class Feasibility:
-    """Requirements of one analysis on its actuators: motors by joint, patches by body.
+    """Requirements of one analysis on its actuators: motors by joint, patches by layout.
 
-    `unsupplied` where it asks for modal forces that no actuator is there for: then motors and patches cannot do it,
-    whatever their limits.
+    `unsupplied`: modal forces required that motors and patches cannot supply, whatever their limits.
     """
 
     motors: dict[str, MotorFeasibility]
@@ -221,7 +207,7 @@ class Feasibility:
 
     @property
     def is_feasible(self) -> bool:
-        """Whether there are actuators for all that is needed, within their limits."""
+        """Whether actuators supply all that is required, within their limits."""
         return self.unsupplied is None and not any(factor > 1.0 for factor in self.factors.values())
 
     @property
@@ -239,10 +225,10 @@ def judge_patches(
     F_p: Array,
     with_count: Callable[[int], float | None] | None,
 ) -> PatchFeasibility:
-    """Required against available of the patches of one layout.
+    """Return the requirements on the patches of one layout.
 
-    Modal coordinates p and forces F_p (T, n) are in the order of the modes of patches, at `time` (T,), s.
-    `with_count(k)` is the largest voltage (V) of k such patches, evenly spread; None where they have no room. Without
+    By modal coordinates p (T, n), m·√kg, and forces F_p (T, n), N/√kg, on the modes of the layout at `time` (T,), s.
+    `with_count(k)`: the largest voltage (V) of k such patches, evenly spread; None where they have no room. Without
     it no other numbers of patches are tried.
     """
     amplifiers, pace = patches.amplifiers, 1.0 / np.diff(time)[:, None]
@@ -265,7 +251,7 @@ def judge_patches(
         current_limit=amplifiers.current,
         field=required / patches.layout.thickness,
         limited_field=np.abs(voltages.within_limit).max(axis=0) / patches.layout.thickness,
-        strain=patches.lever * patches.surface_distance * curvature,
+        strain=patches.lever * (patches.height / 2 + patches.layout.layers * patches.layout.thickness) * curvature,
         mode_required=mode_required,
         mode_available=mode_available,
         find_remedies=partial(_remedies, patches, required, limit, with_count),
@@ -273,9 +259,9 @@ def judge_patches(
 
 
 def worst(values: Array, range: Array) -> tuple[Array, Array]:
-    """Return values (k,) of (T, k) with the largest share of their limits, in absolute value, and these limits.
+    """Return of `values` (T, k) those (k,) with the largest share of their limits, as absolute values, and the limits.
 
-    `range` (2, k): the negative limits, then the positive ones.
+    `range` (2, k): the negative limits, then the positive ones, in the unit of the values.
     """
     pair = np.array([-values.min(axis=0, initial=0.0), values.max(axis=0, initial=0.0)])
     limit = np.abs(range)
@@ -288,48 +274,39 @@ def worst(values: Array, range: Array) -> tuple[Array, Array]:
 def _remedies(
     patches: PatchArray, required: Array, limit: Array, with_count: Callable[[int], float | None] | None
 ) -> Remedies:
-    """What limit, layers, thickness or count alone would do, by c ∝ N (t_b + N t_p) for the patch that lacks most."""
+    """The limit, layers, thickness or count that alone would suffice, by c ∝ N (t_b + N t_p) for the worst patch."""
     k = int(np.argmax(required / limit))
     factor = float(required[k] / limit[k])
     t_b, t_p, N = float(patches.height[k]), patches.layout.thickness, patches.layout.layers
-    lever = max(factor, 1.0) * N * (t_b + N * t_p)  # of N' (t_b + N' t_p), the layers that would do
+    lever = max(factor, 1.0) * N * (t_b + N * t_p)  # N' (t_b + N' t_p) of the layers that suffice
     layers = max(N, int(np.ceil((-t_b + np.sqrt(t_b**2 + 4 * t_p * lever)) / (2 * t_p) - 1e-9)))
-    lever = max(factor, 1.0) * t_p * (t_b + N * t_p)  # of t (t_b + N t), the thickness that would do
+    lever = max(factor, 1.0) * t_p * (t_b + N * t_p)  # t (t_b + N t) of the thickness that suffices
     thickness = (-t_b + np.sqrt(t_b**2 + 4 * N * lever)) / (2 * N)
-    count, most, most_factor = (0, len(patches.edges), factor) if with_count is None else _count(patches, with_count)
-    return Remedies(float(required[k]), layers, float(thickness), count, most, most_factor)
-
-
-def _count(patches: PatchArray, with_count: Callable[[int], float | None]) -> tuple[int, int, float]:
-    """The smallest number of patches that do, the largest that has room, and what factor is missing then."""
-    most, missing = len(patches.edges), np.inf
-    limit = float(np.abs(patches.amplifiers.range).min())
-    for count in range(patches.served, MOST_PATCHES):
-        largest = with_count(count)
-        if largest is None:
-            break
-        most, missing = count, largest / limit
-        if missing <= 1.0:
-            return count, most, missing
-    return 0, most, missing
-
-
-ROUND_OFF = 1e-6  # of the largest modal force: less is what ill-conditioned patches leave
-NEGLIGIBLE = 1e-6  # of the length of a link, of a deflection; rad
+    count, most, missing = 0, len(patches.edges), factor
+    if with_count is not None:
+        missing, least = np.inf, float(np.abs(patches.amplifiers.range).min())
+        for number in range(patches.served, 200):
+            if (largest := with_count(number)) is None:
+                break
+            most, missing = number, largest / least
+            if missing <= 1.0:
+                count = number
+                break
+    return Remedies(float(required[k]), layers, float(thickness), count, most, missing)
 
 
 @struct
 class LinkInMotion:
     """A link with modes, over time."""
 
-    modal: ModalBody  # its modal body
+    modal: ModalBody
     spatial: Body  # its equations
-    p: Array  # (T, n) coordinates of the modes of the modal body
-    F_p: Array  # (T, n) modal forces on these that patches would have to supply
+    p: Array  # (T, n) m·√kg, coordinates of the modes of the modal body
+    F_p: Array  # (T, n) N/√kg, modal forces on these required of patches
 
 
 def links_in_motion(run: Run, bodies: Mapping[str, tuple[ModalBody, Body]]) -> dict[str, LinkInMotion]:
-    """The links of a motion by name; `bodies` are their modal bodies and equations."""
+    """Return the links of a motion by name; `bodies`: their modal bodies and equations."""
     forces, links = actuator_forces(run), {}
     assert forces is not None
     for name, (modal, spatial) in bodies.items():
@@ -343,12 +320,11 @@ def judge_actuators(
     links: Mapping[str, LinkInMotion],
     patches: Mapping[str, LinkPatches],
     voltages: Mapping[str, Voltages],
-    analysis: Analysis,
     others: Container[str],
 ) -> Feasibility:
-    """Required against available of motors by joint ("JOINT 2" of a second coordinate) and of patches by layout.
+    """Return the requirements on motors by joint ("JOINT 2" of a second coordinate) and on patches by layout.
 
-    `others`: links on which something else than patches supplies modal forces.
+    `patches` by link, `voltages` by layout; `others`: links on which something else supplies modal forces.
     """
     judged: dict[str, PatchFeasibility] = {}
     for body, of_link in patches.items():
@@ -357,15 +333,14 @@ def judge_actuators(
             if not array.layout.is_driven:
                 continue
             modes = of_link.modes[name]
-            trial = None if analysis.is_repeated else partial(_largest_voltage, path, run, link, array.layout)
+            trial = None if run.analysis.is_repeated else partial(_largest_voltage, path, run, link, array.layout)
             p, F_p = modes.coordinates(link.p), modes.forces(link.F_p)
             judged[name] = judge_patches(array, voltages[name], run.time, p, F_p, trial)
-    missing = find_unsupplied(run, links, patches, voltages, others)
-    return Feasibility(judge_motors(run, analysis), judged, missing)
+    return Feasibility(judge_motors(run), judged, find_unsupplied(run, links, patches, voltages, others))
 
 
 def _largest_voltage(path: Path, run: Run, link: LinkInMotion, layout: PztLayout, count: int) -> float | None:
-    """V, that so many patches of a layout would need alone, evenly spread; None where they have no room."""
+    """The voltage, V, that `count` patches of a layout would need alone, evenly spread; None if they have no room."""
     from .patches.link_patches import on_kept_modes, with_count
     from .patches.patches import voltage_gain
 
@@ -402,12 +377,17 @@ def find_unsupplied(
     voltages: Mapping[str, Voltages],
     others: Container[str],
 ) -> Unsupplied | None:
-    """Return modal forces that voltages cannot supply, except on links in `others`; None if no link bends by them."""
+    """Return the path error by modal forces that voltages cannot supply; None if they bend no link but `others`."""
     largest = max((float(np.abs(link.F_p).max(initial=0.0)) for link in links.values()), default=0.0)
     unsupplied: list[tuple[float, float, str, str]] = []
     for name, left in find_unmet(links, patches, voltages, limited=False).items():
         modal, counts = links[name].modal, np.abs(left).max(axis=0) > ROUND_OFF * largest
-        deflection, rotation = _largest_shift(links[name], left)
+        body = links[name].spatial.whole
+        p = left @ body.modal_transform / body.stiffness
+        deflection, rotation = (
+            max(float(np.linalg.norm(p @ of.T, axis=1).max()) for of in shapes)
+            for shapes in zip(*((at.translation, at.rotation) for at in body.points.values()), strict=True)
+        )
         if name not in others and counts.any() and max(deflection / modal.length, rotation) > NEGLIGIBLE:
             of_modes = dict.fromkeys(family for family, one in zip(modal.family, counts, strict=True) if one)
             unsupplied.append((deflection, rotation, name, ", ".join(of_modes)))
@@ -419,16 +399,7 @@ def find_unsupplied(
     if not run.space.is_plane:
         about = replace(about, families=families, deflection=deflections, rotation=rotations)
     if not (motors_fit(run) and links.keys() <= run.model.tree.index.keys()):
-        return about  # motors do not say where points are, or links are in pieces
+        return about  # motors do not determine the places of points, or links are in pieces
     followed = [path.point for path in run.model.scene.trajectory if path.point is not None]
     points = followed or point_names(run)
-    return seen_at_points(about, run, find_unmet(links, patches, voltages, limited=True), points)
-
-
-def _largest_shift(link: LinkInMotion, left: Array) -> tuple[float, float]:
-    """Of the points of a link over time, by modal forces (T, n): m, rad."""
-    body = link.spatial.whole
-    p = left @ body.modal_transform / body.stiffness
-    shifts = [(p @ at.translation.T, p @ at.rotation.T) for at in body.points.values()]
-    deflection, rotation = (max(float(np.linalg.norm(shift[k], axis=1).max()) for shift in shifts) for k in range(2))
-    return deflection, rotation
+    return _seen_at_points(about, run, find_unmet(links, patches, voltages, limited=True), points)

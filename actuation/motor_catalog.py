@@ -1,4 +1,4 @@
-"""Motors of a catalog that can do what a joint has to do."""
+"""Motors of a catalog that suffice for the task of a joint."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ class CatalogMotor(Record):
     """A motor with the gears that it is sold with; all values at the motor, before the gear."""
 
     name: str
-    """Its name."""
+    """Name of the motor."""
     rated_torque: Positive
-    """Torque that it can give for ever, N·m (N of linear motors): what the RMS may be."""
+    """Largest continuous torque, N·m (N of linear motors): limit of the RMS."""
     peak_torque: Positive
-    """Torque that it can give for a moment, N·m (N)."""
+    """Largest torque for a short time, N·m (N)."""
     max_speed: Positive
-    """Speed, rad/s (m/s)."""
+    """Largest speed, rad/s (m/s)."""
     rotor_inertia: NotNegative = 0.0
-    """Of the rotor with what turns with it, kg·m² (kg)."""
+    """Inertia of the rotor with all that turns with it, kg·m² (kg)."""
     gear_ratio: tuple[Positive, ...] = (1.0,)
     """Ratios of the gears to choose from: turns of the motor for one of the joint."""
     efficiency: float = Field(default=1.0, gt=0.0, le=1.0)
-    """Of the gear."""
+    """Efficiency of the gear."""
     mass: Positive | None = None
-    """Of motor and gear, kg: lighter ones are listed first."""
+    """Mass of motor and gear, kg: lighter ones are listed first."""
     cost: Positive | None = None
-    """Of motor and gear, in any currency."""
+    """Cost of motor and gear, in any currency."""
 
 
 class _Catalog(Record):
@@ -45,7 +45,7 @@ class _Catalog(Record):
 
 
 class JointTask(NamedTuple):
-    """Task of a joint: `time` (T,), s; `load` (T,), N·m or N, without any rotor; rate and acceleration."""
+    """Task of a joint over `time` (T,), s: `load` (T,), N·m or N, without any rotor; rate and acceleration (T,), SI."""
 
     time: Array
     load: Array
@@ -54,10 +54,7 @@ class JointTask(NamedTuple):
 
 
 class MotorChoice(NamedTuple):
-    """A motor with one of its gears on a joint: shares of its torques and speed that the task takes (1 is all).
-
-    `rms`, `peak`, `speed` are of the motor, in its units.
-    """
+    """A motor with one of its gears on a joint: RMS and peak of its torque (N·m or N), and its speed (rad/s or m/s)."""
 
     motor: CatalogMotor
     ratio: float
@@ -67,13 +64,13 @@ class MotorChoice(NamedTuple):
 
     @property
     def shares(self) -> tuple[float, float, float]:
-        """Shares of rated torque, peak torque and speed."""
+        """Shares of rated torque, peak torque and speed that the task takes; 1 is all."""
         motor = self.motor
         return self.rms / motor.rated_torque, self.peak / motor.peak_torque, self.speed / motor.max_speed
 
     @property
     def fits(self) -> bool:
-        """Whether the motor can do it."""
+        """Whether the motor suffices for the task."""
         return max(self.shares) <= 1.0
 
 
@@ -95,14 +92,13 @@ def read_catalog(path: Path) -> tuple[CatalogMotor, ...]:
                 " the header has",
                 len(row),
             )
-    return validate(_Catalog, {"motor": [_of_line(dict(zip(header, row, strict=True))) for _, row in rows]}, path).motor
-
-
-def _of_line(line: dict[str, str]) -> dict[str, Any]:
-    given: dict[str, Any] = {key: text for key, text in line.items() if text}
-    if "gear_ratio" in given:
-        given["gear_ratio"] = tuple(given["gear_ratio"].split())
-    return {key: text if key == "name" else _numbers(text) for key, text in given.items()}
+    motors = []
+    for _, row in rows:
+        given: dict[str, Any] = {key: text for key, text in zip(header, row, strict=True) if text}
+        if "gear_ratio" in given:
+            given["gear_ratio"] = tuple(given["gear_ratio"].split())
+        motors.append({key: text if key == "name" else _numbers(text) for key, text in given.items()})
+    return validate(_Catalog, {"motor": motors}, path).motor
 
 
 def _numbers(text: Any) -> Any:
@@ -114,16 +110,16 @@ def _numbers(text: Any) -> Any:
 
 def choices(task: JointTask, catalog: Sequence[CatalogMotor]) -> list[MotorChoice]:
     """Return every motor with each of its gears: fitting ones first, ordered by mass (or size)."""
-    rated = [choice_of(task, motor, N) for motor in catalog for N in motor.gear_ratio]
-    return sorted(rated, key=lambda one: (not one.fits, _size(one.motor) if one.fits else max(one.shares)))
 
+    def order(one: MotorChoice) -> tuple[float, ...]:
+        motor, mass = one.motor, np.inf if one.motor.mass is None else one.motor.mass
+        return (0.0, mass, motor.rated_torque, motor.peak_torque) if one.fits else (1.0, max(one.shares))
 
-def _size(motor: CatalogMotor) -> tuple[float, ...]:
-    return (np.inf if motor.mass is None else motor.mass, motor.rated_torque, motor.peak_torque)
+    return sorted((choice_of(task, motor, N) for motor in catalog for N in motor.gear_ratio), key=order)
 
 
 def choice_of(task: JointTask, motor: CatalogMotor, N: float) -> MotorChoice:
-    """Judge a motor with gear ratio N: τ = J N α + L/(N η) if load L takes power, J N α + η L/N if it returns it."""
+    """Judge a motor with gear ratio N: τ = J N α + L/(N η) while the load L takes power, J N α + η L/N else."""
     is_driven = task.load * task.rate >= 0.0
     through = np.where(is_driven, 1.0 / motor.efficiency, motor.efficiency)
     torque = motor.rotor_inertia * N * task.acceleration + task.load * through / N

@@ -1,4 +1,4 @@
-"""What every motor has to do over time, against what it can: peaks, root mean squares, torques at rest."""
+"""Requirements on motors over time against their limits: peaks, root mean squares, torques at rest."""
 
 from __future__ import annotations
 
@@ -19,14 +19,9 @@ from ..mbs.model.nodes import rotor
 from ..mbs.quantities.motion import joint_motion
 from ..mbs.quantities.supply import actuator_forces, motor_motion
 from ..mbs.run.record import Run
-from ..mbs.scene.analysis import Analysis
 
-SHORT = 0.01  # of the time: a peak that lasts less is one of its own
-APART = 1.1  # times the moment of the other 99 % of the time: likewise
 NEARBY = 1e-3  # of the path's duration: a jump of the path this near to a peak may have made it
 INSTANT = 1e-4  # of the path's duration: over which one-sided derivatives are taken
-ROWS = 50  # of a run, at most, at which inertias are computed
-AT_REST = 21  # of a run, at most, at which torques at rest are: equilibria take longer
 JUMP = 0.05  # of the largest acceleration or jerk of the path: less is none
 
 
@@ -41,18 +36,17 @@ class MotorFeasibility:
     power: float
     power_limit: float
     saturation_time: float  # when a limit is first exceeded, s; NaN where none is
-    # root mean square over the path, from t = 0 to the end of the analysis: losses in the windings go with its square,
-    # so that a constant moment of this size heats the motor as much (thermal-equivalent moment)
+    # root mean square over the path, from t = 0 to the end of the analysis: a constant torque of this size heats the
+    # windings as much (thermal-equivalent torque)
     rms_moment: float = np.nan  # these are not in files of version 0.1
-    usual_moment: float = np.nan  # that is not exceeded for 99 % of the time, pre- and post-actuation included
-    moment_time: float = np.nan  # when the moment is largest, s
-    share_beyond: float = np.nan  # of the time that any of them is
+    usual_moment: float = np.nan  # not exceeded for 99 % of the time, pre- and post-actuation included
+    moment_time: float = np.nan  # when the torque is largest, s
+    share_beyond: float = np.nan  # share of the time on the path beyond any limit
     # largest of the robot along the joint, with other joints locked and links rigid, without the rotor, kg·m² (kg); NaN
     # where loops share it among joints
     load_inertia: float = np.nan
-    # "acceleration" or "jerk" of the path where that jumps at a short peak which follows from it; else ""
-    jump: str = ""
-    # largest at rest along the path, which no slower path makes smaller; NaN where the limit is enough, or not known
+    jump: str = ""  # "acceleration" or "jerk" of the path if its jump causes a short peak; else ""
+    # largest at rest along the path, which a slower path does not reduce; NaN if within the limit, or not known
     static_moment: float = np.nan
 
     @property
@@ -67,11 +61,11 @@ class MotorFeasibility:
 
     @property
     def has_spike(self) -> bool:
-        """Whether the largest moment exceeds that of 99 % of the time by more than a tenth."""
-        return self.moment > APART * self.usual_moment
+        """Whether the largest torque exceeds that of 99 % of the time by more than a tenth."""
+        return self.moment > 1.1 * self.usual_moment
 
     def spike_in_words(self, unit: str) -> str:
-        """Explain a short peak of the moment, given in `unit`, and its remedy; empty where there is none."""
+        """Explain a short peak of the torque, in `unit`, and its remedy; empty where there is none."""
         if not self.has_spike:
             return ""
         why = f": the {self.jump} of the path jumps there, so take a smoother path" if self.jump else ""
@@ -82,12 +76,9 @@ class MotorFeasibility:
         )
 
 
-def judge_motors(run: Run, analysis: Analysis) -> dict[str, MotorFeasibility]:
-    """Return the requirements on every motor up to the end of the path, by joint or "JOINT k".
-
-    Behind a compliant gear the motor turns otherwise than its joint.
-    """
-    forces, verdicts = actuator_forces(run), {}
+def judge_motors(run: Run) -> dict[str, MotorFeasibility]:
+    """Return the requirements on every motor up to the end of the path, by joint or "JOINT k"."""
+    forces, verdicts, end = actuator_forces(run), {}, run.analysis.last_time
     assert forces is not None
     inertias = _load_inertias(run)
     at_rest: Mapping[str, Array] = {}
@@ -98,27 +89,25 @@ def judge_motors(run: Run, analysis: Analysis) -> dict[str, MotorFeasibility]:
         moments, rates = forces.moments[joint.name], of_joint[1] if motor is None else motor[1][:, None]
         for k, limits in enumerate(joint.motor_limits):
             name = joint.name if len(joint.units) == 1 else f"{joint.name} {k + 1}"
-            judged = judge_motion(run.time, moments[:, k], rates[:, k], limits, analysis.last_time)
-            jump = path_jump(run, analysis, judged.moment_time) if judged.has_spike else ""
-            verdicts[name] = replace(judged, jump=jump, load_inertia=inertias.get(joint.name, (np.nan,) * (k + 1))[k])
+            judged = judge_motion(run.time, moments[:, k], rates[:, k], limits, end)
+            jump, static = path_jump(run, judged.moment_time) if judged.has_spike else "", np.nan
             if judged.moment > judged.moment_limit:
-                at_rest = at_rest or static_moments(run, analysis.last_time)
-                if joint.name in at_rest:
-                    verdicts[name] = replace(
-                        verdicts[name], static_moment=float(np.abs(at_rest[joint.name][:, k]).max())
-                    )
+                at_rest = at_rest or static_moments(run, end)
+                static = float(np.abs(at_rest[joint.name][:, k]).max()) if joint.name in at_rest else static
+            inertia = inertias.get(joint.name, (np.nan,) * (k + 1))[k]
+            verdicts[name] = replace(judged, jump=jump, load_inertia=inertia, static_moment=static)
     return verdicts
 
 
 def static_moments(run: Run, end: float) -> Mapping[str, Array]:
-    """Torques (T, k) by joint, N·m or N, in the equilibria at instants of a path from t = 0 to `end` (s).
+    """Return torques (T, k) by joint, N·m or N, in equilibria at up to 21 instants of a path from t = 0 to `end` (s).
 
-    Empty where no equilibrium is found, or motors do not fit the path.
+    Empty where there is no equilibrium, or motors do not fit the path.
     """
     on_path = np.flatnonzero((run.time >= 0.0) & (run.time <= end))
     if not len(on_path):
         return {}
-    rows = on_path[np.unique(np.linspace(0, len(on_path) - 1, AT_REST).astype(int))]
+    rows = on_path[np.unique(np.linspace(0, len(on_path) - 1, 21).astype(int))]
     time, still = run.time[rows], np.zeros((len(rows), run.model.tree.n_v))
     statics, states, multipliers = Statics(run.model), [], []
     try:
@@ -137,7 +126,7 @@ def _load_inertias(run: Run) -> dict[str, tuple[float, ...]]:
     model = run.model
     if model.loop_rows.any() or not len(run.time):
         return {}
-    rows = np.unique(np.linspace(0, len(run.time) - 1, ROWS).astype(int))
+    rows = np.unique(np.linspace(0, len(run.time) - 1, 50).astype(int))
     inertia = mass_matrices(model, run.q[rows])
     most = inertia.diagonal(axis1=1, axis2=2).max(axis=0)
     inertias, behind = {}, {gear.joint.joint.name: gear.joint.v for gear in model.tree.gears}
@@ -149,14 +138,15 @@ def _load_inertias(run: Run) -> dict[str, tuple[float, ...]]:
 
 
 def judge_motion(time: Array, moment: Array, rate: Array, limits: MotorLimits, end: float) -> MotorFeasibility:
-    """Return the requirements of `moment` (T,) at `rate` (T,) of a joint over `time` (T,); SI units.
+    """Return the requirements of torques `moment` (T,) at rates (T,) of a joint over `time` (T,); SI units.
 
-    Root mean square and shares of time are those from 0 to `end` (s), without what comes before and after the path.
+    Root mean square and shares of time are those from 0 to `end` (s), without pre- and post-actuation.
     """
     (peak, at), (speed, _), (power, _) = (largest(time, values) for values in (moment, rate, moment * rate))
     beyond = (np.abs(moment) > limits.moment) | (np.abs(rate) > limits.speed) | (np.abs(moment * rate) > limits.power)
-    path = (time >= 0.0) & (time <= end)
-    on_path = time[path]
+    path, order = (time >= 0.0) & (time <= end), np.argsort(np.abs(moment))
+    on_path, below = time[path], np.cumsum(shares(time)[order])
+    usual = order[min(int(np.searchsorted(below, 0.99)), len(time) - 1)]
     return MotorFeasibility(
         moment=peak,
         moment_limit=limits.moment,
@@ -166,23 +156,23 @@ def judge_motion(time: Array, moment: Array, rate: Array, limits: MotorLimits, e
         power_limit=limits.power,
         saturation_time=float(first_time(time, beyond[:, None])[0]) if beyond.any() or peak <= limits.moment else at,
         rms_moment=root_mean_square(on_path, moment[path]),
-        usual_moment=_not_exceeded(time, np.abs(moment), 1.0 - SHORT),
+        usual_moment=float(np.abs(moment[usual])),
         moment_time=at,
         share_beyond=float(shares(on_path) @ beyond[path]),
     )
 
 
 def first_time(time: Array, beyond: Booleans) -> Array:
-    """The first of the times (T,), s, at which each column of `beyond` (T, k) holds; NaN where it never does."""
+    """Return the first time (k,), s, of `time` (T,) at which each column of `beyond` (T, k) is true; NaN if never."""
     return np.where(beyond.any(axis=0), time[beyond.argmax(axis=0)], np.nan)
 
 
-def path_jump(run: Run, analysis: Analysis, at: float) -> str:
+def path_jump(run: Run, at: float) -> str:
     """Return which derivative of a trajectory jumps near the time `at` (s), if torques follow from it.
 
-    "acceleration", in motors-only analyses "jerk" too, else "": a path is held before t = 0 and after its end.
+    "acceleration", in motors-only analyses "jerk" too, else "". A path is constant before t = 0 and after its end.
     """
-    end = analysis.last_time
+    end = run.analysis.last_time
     if end <= 0.0 or len(run.time) < 2:
         return ""
     h = INSTANT * end
@@ -201,13 +191,6 @@ def path_jump(run: Run, analysis: Analysis, at: float) -> str:
             return "acceleration"
         jerks = (before[0] - before[1]) / h, (after[1] - after[0]) / h
         largest = np.abs(np.diff(all_over)).max() / (end / 1000)
-        if analysis.follows_jerk and np.any(np.abs(jerks[1] - jerks[0]) > JUMP * largest):
+        if run.analysis.follows_jerk and np.any(np.abs(jerks[1] - jerks[0]) > JUMP * largest):
             return "jerk"
     return ""
-
-
-def _not_exceeded(time: Array, values: Array, share: float) -> float:
-    """The value that is exceeded for no more than the rest of the time."""
-    order = np.argsort(values)
-    part = np.cumsum(shares(time)[order])
-    return float(values[order][min(int(np.searchsorted(part, share)), len(values) - 1)])

@@ -1,11 +1,11 @@
 """Actuation points (Shabana 2022, Eqs. 5–10): generalized driving forces of a body as forces along x, y, z.
 
-Forces F_a at points of a body do L_a F_a on it, with a column [e; u × e; Φᵀe] for a unit force along e at u = x + Φp:
-on R and on the rotation, both in axes of the body, and on its modes. Q_a are the forces that the trajectories have on
-it, and those that hold a shape.
+Forces F_a at points of a body are generalized forces L_a F_a, with a column [e; u × e; Φᵀe] for a unit force along e at
+u = x + Φp: on R and on the rotation, both in axes of the body, and on its modes. Q_a are the generalized forces of
+trajectories and of prescribed shapes.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
@@ -27,7 +27,7 @@ from ..mbs.model.motors import path_forces, path_forces_on_bodies
 from ..mbs.run.record import Run
 from ..mbs.scene.space import SPACES, Space
 
-DEPENDENT = 1e-10  # ratio of singular values of L_a below which components count as saying the same
+DEPENDENT = 1e-10  # ratio of singular values of L_a below which components are dependent
 AXES = "xyz"
 ALONG = {"x": "x", "axial": "x", "y": "y", "transverse": "y", "z": "z"}
 """The axis along which forces act at the places of a key."""
@@ -76,7 +76,7 @@ class PointSet:
     names: tuple[str, ...]  # of the points, one for each component
     axes: tuple[str, ...]  # "x", "y" or "z", likewise
     points: tuple[BodyPoint, ...]  # likewise, in the coordinates of the `Body`
-    scale: Array  # (6 + n) factors that make the rows of L_a forces in N: 1, 1/length, √mass
+    scale: Array  # (6 + n,) factors that make the rows of L_a forces in N: 1, 1/length, √mass
 
     @property
     def direction(self) -> Array:
@@ -84,12 +84,12 @@ class PointSet:
         return np.eye(3)[:, [AXES.index(axis) for axis in self.axes]]
 
     def of_core(self) -> tuple[Array, Array, Array, Array]:
-        """Return arrays for the core: mbs/core/analysis/found_forces.h."""
+        """Return directions (3, c), positions (3, c) m, shapes (3 c, n), scale for mbs/core/analysis/found_forces.h."""
         position = np.transpose([point.position for point in self.points])
         return self.direction, position, np.vstack([point.translation for point in self.points]), self.scale
 
     def L_a(self, p: Array) -> Array:
-        """Return generalized forces (T, 6 + n, c) of unit force components at modal coordinates p (T, n)."""
+        """Return generalized forces (T, 6 + n, c) of components of 1 N at modal coordinates p (T, n), body axes."""
         e, columns = self.direction, []
         for k, point in enumerate(self.points):
             u = point.position + p @ point.translation.T
@@ -99,17 +99,17 @@ class PointSet:
         return np.stack(columns, axis=2)
 
     def scaled(self, p: Array) -> Array:
-        """L_a (T, 6 + n, c) at p (T, n), its rows as forces in N."""
+        """Return L_a (T, 6 + n, c) at p (T, n), its rows as forces in N."""
         return self.scale[:, None] * self.L_a(p)
 
 
 def make_point_set(
     scene_path: Path, layout: ActuationPoints, body: ModalBody | None, spatial: Body, space: Space
 ) -> PointSet:
-    """Choose the components of points to follow: the scene's, or the independent ones that are best conditioned.
+    """Return the components of force of the scene, or independent ones that are well conditioned.
 
-    Raises `InputError` for places that the body has not, for more components than coordinates, and for components that
-    do the same to the body; in the plane for a body whose points cannot carry all its generalized forces.
+    Raises `InputError` for places that the body has not, for more components than coordinates, and for dependent
+    components; in the plane for a body whose points cannot carry all its generalized forces.
     """
     key = f'{scene_path}: actuation_points "{layout.body}"'
     coordinates = len(space.translations) + len(space.rotations) + spatial.n_modes
@@ -127,7 +127,12 @@ def make_point_set(
             len(layout.places),
         )
     points = [_point(key, place, body, spatial) for _, place in layout.places]
-    _check_apart(key, layout.places, points, 1e-9 * (spatial.length or 0.0))
+    for (i, (along, first)), (k, (other, second)) in combinations(enumerate(layout.places), 2):
+        near = 1e-9 * (spatial.length or 0.0)
+        if along == other and np.allclose(points[i].position, points[k].position, rtol=0, atol=near):
+            raise InputError(
+                f"{key}: {along}: expected points apart from each other", f"two at {first} and {second} that coincide"
+            )
     chosen = _named(layout.body, tuple(ALONG[along] for along, _ in layout.places), points, spatial)
     sizes = np.linalg.svd(chosen.scaled(np.zeros((1, spatial.n_modes)))[0], compute_uv=False)
     rank = int(np.count_nonzero(sizes > DEPENDENT * sizes[0]))
@@ -141,24 +146,19 @@ def make_point_set(
     return chosen
 
 
-def _check_apart(key: str, places: Sequence[tuple[str, Place]], points: Sequence[BodyPoint], near: float) -> None:
-    """Raise `InputError` for components along one axis at points less than `near` (m) apart."""
-    for (i, (along, first)), (k, (other, second)) in combinations(enumerate(places), 2):
-        if along == other and np.allclose(points[i].position, points[k].position, rtol=0, atol=near):
-            raise InputError(
-                f"{key}: {along}: expected points apart from each other", f"two at {first} and {second} that coincide"
-            )
-
-
 def with_points(spatial: Body, chosen: PointSet) -> Body:
-    """The body with the actuation points among its points, where forces can act."""
+    """Return the body with the actuation points among its points."""
     own = dict(zip(chosen.names, chosen.points, strict=True))
     return replace(spatial, points=MappingProxyType({**spatial.points, **own}))
 
 
 def _automatic(key: str, name: str, body: ModalBody | None, spatial: Body, axes: str) -> PointSet:
-    """Out of all components at every station, those that QR with column pivoting takes first: far from dependent."""
-    points = [_point(key, place, body, spatial) for place in _candidate_places(key, body, spatial.points)]
+    """Of all components at the stations of a link, or the points of a rigid body, the first in QR with pivoting."""
+    if body is not None:
+        places: list[Place] = np.unique(body.stations.position[:, 0]).tolist()
+    elif not (places := list(spatial.points)):
+        raise InputError(f"{key}: expected a rigid body with points", "none")
+    points = [_point(key, place, body, spatial) for place in places]
     candidates = _named(name, tuple(axis for axis in axes for _ in points), points * len(axes), spatial)
     _, R, order = scipy.linalg.qr(candidates.scaled(np.zeros((1, spatial.n_modes)))[0], mode="economic", pivoting=True)
     sizes = np.abs(np.diag(R))
@@ -174,23 +174,8 @@ def _named(name: str, axes: tuple[str, ...], points: list[BodyPoint], spatial: B
     return PointSet(name, tuple(f"actuation{k}" for k in range(1, len(points) + 1)), axes, tuple(points), scale)
 
 
-def _candidate_places(key: str, body: ModalBody | None, points: Mapping[str, BodyPoint]) -> list[Place]:
-    """Where components may be put: the stations of a link, the points of a rigid body.
-
-    Raises `InputError` where there are none.
-    """
-    if body is not None:
-        return [float(x) for x in np.unique(body.stations.position[:, 0])]
-    if not points:
-        raise InputError(f"{key}: expected a rigid body with points", "none")
-    return list(points)
-
-
 def _point(key: str, place: Place, body: ModalBody | None, spatial: Body) -> BodyPoint:
-    """One of the points of a body by its name, or the section at a distance from its link's root.
-
-    Raises `InputError` for a place that the body has not.
-    """
+    """The point of a body with a name, or the section at a distance (m) from the root of its link."""
     points = spatial.points
     if isinstance(place, str):
         check_known(place, points, f"{key}: expected a point of the body ({quoted(points)})")
@@ -212,13 +197,13 @@ class PointForces:
     # (T, 6 + n) Q_a − L_a F_a on R and on the rotation, both in axes of the body, and on p: N, N·m, N/√kg; in the plane
     # (T, 3 + n) on (R, θ, p), R in global axes
     unmet: Array
-    residual: Array  # (T,) its norm with the scale of the set, N
+    residual: Array  # (T,) N, norm of the scaled `unmet`
     rank: int  # least rank of the scaled L_a
     condition_number: float  # largest of the scaled L_a
 
 
 def solve_points(chosen: PointSet, run: Run) -> PointForces:
-    """Solve L_a F_a = Q_a at every output, by least squares: forces at points for the driving forces Q_a."""
+    """Solve L_a F_a = Q_a for the forces at points at every output of a run, by least squares."""
     node = run.model.tree.nodes[run.model.tree.index[chosen.body]]
     Q_a = find_driving_forces(run)[chosen.body]
     p = run.q[:, node.p_q]
@@ -237,7 +222,7 @@ def solve_points(chosen: PointSet, run: Run) -> PointForces:
 
 
 def forces_at_points(chosen: Mapping[str, PointSet], run: Run) -> dict[str, Array]:
-    """Return forces (T, 3) by "BODY.POINT", N, global axes, along the motion of a run.
+    """Return forces (T, 3), N, global axes, by "BODY.POINT" along the motion of a run.
 
     Raises `InputError` where a body without points has driving forces.
     """
@@ -261,10 +246,10 @@ def forces_at_points(chosen: Mapping[str, PointSet], run: Run) -> dict[str, Arra
 
 
 def find_driving_forces(run: Run) -> dict[str, Array]:
-    """Q_a by body, (T, 6 + n): force and moment on its frame, both in its axes, and on its modes."""
+    """Return Q_a (T, 6 + n) by body: force (N) and moment (N·m) on its frame, in its axes, and on its modes (N/√kg)."""
     model = run.model
     by_body = path_forces_on_bodies(model, run.time, run.q, run.multipliers)
-    if run.required is not None:  # a shape is held besides, by forces on the modes alone
+    if run.required is not None:  # forces on the modes alone, for a prescribed shape
         held = run.required - path_forces(model, run.time, run.q, run.multipliers)
         for node in model.tree.nodes:
             by_body[node.body.name][:, 6:] += held[:, node.p_v]

@@ -19,7 +19,7 @@ from ffrobot.design.sensitivity import Sensitivity
 from ffrobot.design.uncertainty_record import Uncertainty
 from ffrobot.fe_models.link import LinkOutcome
 from ffrobot.fit.fitting import Fit
-from ffrobot.fit.frf_fit import PoseComparison, ResponseFit
+from ffrobot.fit.frf import PoseComparison, ResponseFit
 from ffrobot.results.verdict import AnalysisVerdict, Verdict
 from ffrobot.smooth.smoothing import Smoothed
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import redirect_stdout, suppress
 from copy import copy
 from dataclasses import replace
 from functools import cache, partial
+from io import StringIO
 
 import numpy as np
 
 from ...common.arrays import Array, as_list
 from ...common.errors import InputError, SolveError
+from ...common.libraries import scipy
 from ...mbs._core import TimeFunction
 from ...mbs.analysis.forward import actuator_commands, command_ranges, largest_moments, strain_directions
 from ...mbs.linear.linearisation import LinearEquations
@@ -33,30 +35,12 @@ from ..patches.link_patches import LinkPatches
 from .controllers import ComputedTorqueControl, Controller, PythonControl, make_controllers
 from .linear import voltages_at
 from .linear_model import LinearModel, state_space
-from .loop import (
-    AmplifiedLoop,
-    Loop,
-    between,
-    held_commands,
-    held_until,
-    loop_record,
-    sample_times,
-    times_of_run,
-)
+from .loop import AmplifiedLoop, Loop, between, held_commands, loop_record, times_of_run
 from .margins import MOST, Feedback, eigenvalue_count, lowest_frequency
-from .metrics import LoopMotion, last_change, place_of_tip
+from .metrics import LoopMotion, last_change
 from .observer import Observed, make_observed
-from .probing import LONGEST, find_feedback
 from .records import SampledAnalysis
-from .robot import (
-    ControlledRobot,
-    Setup,
-    default_tip,
-    estimated_sensors,
-    input_names,
-    needed_sensors,
-    whole_robot,
-)
+from .robot import ControlledRobot, Setup, default_tip, estimated_sensors, input_names, needed_sensors, whole_robot
 from .signals import Filter, Sensing, Signal, filters, make_signals, merged, readings_at
 
 APART = 1e-6  # of a run, between two times of a spline
@@ -75,9 +59,9 @@ class ClosedLoop(SampledAnalysis):
     """
 
     def run(self, context: ActuatedContext) -> Run:
-        """The closed loop about the motion of an inverse analysis, from its initial state.
+        """Run the closed loop about the motion of an inverse analysis, from its initial state.
 
-        The run's details are a `LoopRecord`. One that diverges ends there and is kept. Raises `InputError` for
+        The run's details are a `LoopRecord`. A run that diverges ends there and is kept. Raises `InputError` for
         controllers that do not fit the robot, `SolveError` where a user's function fails.
         """
         assert self.actuation is not None
@@ -91,7 +75,8 @@ class ClosedLoop(SampledAnalysis):
         place_at = _place_of_tip(self, plant, source, tip)
         lowest = lowest_frequency(models, self.controller, self.sample_time, self.delay)
         times, rows = times_of_run(outputs, place_at, lowest)
-        samples = sample_times(outputs, self.sample_time)
+        count = int(np.ceil(np.ptp(outputs) / self.sample_time * (1 - 1e-12)))
+        samples = outputs[0] + np.arange(count) * self.sample_time  # before the last output
         seen = source if moved.gears else _resolved(source)  # gears that give are known at outputs
         of_seen = moved if moved.gears else with_motor_coordinates(seen, plant)
         reference, wanted = (
@@ -137,13 +122,7 @@ class ClosedLoop(SampledAnalysis):
         if amplifiers.acts:
             directions = strain_directions(plant, context.patches)
             arriving = AmplifiedLoop(
-                loop,
-                at_sample,
-                samples,
-                self.sample_time,
-                amplifiers=amplifiers,
-                directions=directions,
-                splits=splits,
+                loop, at_sample, samples, self.sample_time, amplifiers=amplifiers, directions=directions, splits=splits
             )
             samples, at_sample = arriving.times, arriving
         instant, inputs = INSTANT * self.sample_time, actuator_commands(plant, context.patches)
@@ -165,25 +144,24 @@ class ClosedLoop(SampledAnalysis):
             control=control,
         )  # fmt: skip
         closer, run = run.closer, run.at([k for k in rows if k < len(run.time)])
-        quiet = max((last_change(partial(_values, of, self), outputs) for of in _exciting(plant, self)), default=0.0)
-        runs = _followed(run, place_at, held, tip, quiet), _followed(closer, place_at, held, tip, quiet)
+        quiet = _last_change(plant, self, outputs)
+        motion = _followed(closer, place_at, held, tip, quiet)
         readings = loop.readings if observed is None else np.hstack([loop.readings, observed.estimates])
         found, along = loops_about(setup, begun, readings[: loop.taken], models)
         filtering = filters(read, self.sample_time)
         every = ((model, feedback.behind(*filtering)) for model, feedback in found)
         loops = [loop for loop in every if eigenvalue_count(loop, self.sample_time, self.delay) <= MOST]
-        gears = bool(plant.tree.gears)
-        with run.arithmetic:
-            record = loop_record(self, setup, loop, acting, runs, loops=loops, lowest=lowest, gears=gears)
-        record = replace(record, feedback=along)
+        estimate, gears = None, bool(plant.tree.gears)
         if observed is not None:
             true = ideal.read(*np.split(np.array(states[: loop.taken]), [n_q, rates], axis=1)).T
-            names = [each.name for each in estimated]
-            record = replace(record, estimate=observed.record(dict(zip(names, true, strict=True))))
+            estimate = observed.record(dict(zip([each.name for each in estimated], true, strict=True)))
+        with run.arithmetic:
+            error = np.linalg.norm(_position(run.model, run.q, tip) - place_at(run.time), axis=1)
+            record = loop_record(self, setup, loop, acting, motion, loops=loops, lowest=lowest, gears=gears)
+        record = replace(record, tip_error=error, feedback=along, estimate=estimate)
 
         def completed(of: Run) -> Run:
-            commanded = context.model.by_motor(held(of.time))
-            return replace(of, commanded=commanded, details=record)
+            return replace(of, commanded=context.model.by_motor(held(of.time)), details=record)
 
         return replace(completed(run), look_closer=lambda: completed(closer))
 
@@ -224,15 +202,12 @@ def loop_models(
 
 
 def loops_about(
-    setup: Setup,
-    controllers: Sequence[Controller],
-    readings: Array,
-    models: Sequence[LinearModel],
+    setup: Setup, controllers: Sequence[Controller], readings: Array, models: Sequence[LinearModel]
 ) -> tuple[list[tuple[LinearModel, Feedback]], Mapping[float, Feedback]]:
-    """The linear `models`, each with the linear controllers at its time; and controllers by time (s).
+    """Return the linear `models`, each with the linear controllers at its time; and controllers by time (s).
 
     The latter are those at the start, or at each time of an observer's schedule. Both are empty where a controller is
-    not linear at the time of a model.
+    not linear at the time of a model. `readings` (K, outputs) of the run.
     """
     observed = controllers[0] if controllers and isinstance(controllers[0], Observed) else None
     acting, asked = (setup, controllers) if observed is None else (observed.setup, observed.controllers)
@@ -256,17 +231,16 @@ def loops_about(
     return known, {t: law for t in times if (law := at(t, 0)) is not None}
 
 
-def _exciting(model: Model, analysis: ClosedLoop) -> Iterator[TimeFunction]:
-    for path in model.scene.trajectory:
-        yield from (target for _, target in path.targets)
-    yield from model.scene.load_functions
-    for load in analysis.disturbance:
-        yield from load.components.values()
+def _last_change(model: Model, analysis: ClosedLoop, time: Array) -> float:
+    """The time (s) from which paths and loads stay as they are at the end of `time` (T,)."""
+    exciting = [target for path in model.scene.trajectory for _, target in path.targets]
+    exciting += model.scene.load_functions
+    exciting += [function for load in analysis.disturbance for function in load.components.values()]
 
+    def values(of: TimeFunction, time: Array) -> Array:
+        return of.sample(np.clip(time, 0.0, analysis.last_time))[0][:, None]
 
-def _values(of: TimeFunction, analysis: ClosedLoop, time: Array) -> Array:
-    """(T, 1) at `time` (T,), s, held outside the run."""
-    return of.sample(np.clip(time, 0.0, analysis.last_time))[0][:, None]
+    return max((last_change(partial(values, of), time) for of in exciting), default=0.0)
 
 
 def _feed_forward(
@@ -278,12 +252,11 @@ def _feed_forward(
     *,
     whole: bool = False,
 ) -> Array:
-    """(K, inputs) moments and voltages of the inverse analysis, in the middle of the time for which each is held.
+    """Torques and voltages (K, inputs) of the inverse analysis, in the middle of the time for which each is held.
 
     Those that are fed forward, or, `whole`, all.
     """
-    middle = held_until(times, analysis, source.time[-1])
-
+    middle = np.minimum(times + analysis.delay + analysis.sample_time / 2, source.time[-1])
     most = largest_moments(context.model, limits=False)
     values = supplied(source, most, context.patches, limited=not analysis.unlimited).sample(as_list(middle))
     kind = "joints+pzt" if whole else analysis.feed_forward
@@ -294,8 +267,7 @@ def _feed_forward(
     column = 0
     for joint, columns in context.model.motors.items():  # with compliant gears: known at outputs
         if moved.gears and kind != "none":
-            moments = moved.moments[joint]
-            values[:, column : column + len(columns)] = between(middle, source.time, moments)
+            values[:, column : column + len(columns)] = between(middle, source.time, moved.moments[joint])
         column += len(columns)
     return values
 
@@ -319,23 +291,124 @@ def _start(context: ActuatedContext, analysis: ClosedLoop, plant: Model, moved: 
 def _followed(
     run: Run, place_at: Callable[[Array], Array], held: Callable[[Array], Array], tip: str, quiet: float
 ) -> LoopMotion:
-    """Where the tip went against where it should be; `quiet` as there."""
+    """The motion of the tip against the one wanted."""
     assert isinstance(run.analysis, ClosedLoop)
     model = run.model
     signs = np.array([model.sign(joint) for joint, of in model.motors.items() for _ in of])
     rates = signs * run.v[:, model.motor_columns]
     error = _position(model, run.q, tip) - place_at(run.time)
-    completed, is_disturbed = run.status == "completed", bool(run.analysis.disturbance)
-    motion = run.time, error, place_at, rates, held(run.time)
-    return LoopMotion(*motion, completed, is_disturbed, quiet, model.size)
+    return LoopMotion(
+        time=run.time,
+        error=error,
+        place_at=place_at,
+        rates=rates,
+        held=held(run.time),
+        completed=run.status == "completed",
+        is_disturbed=bool(run.analysis.disturbance),
+        quiet=quiet,
+        length=model.size,
+    )
 
 
 def _place_of_tip(analysis: ClosedLoop, model: Model, source: Run, tip: str) -> Callable[[Array], Array]:
-    paths, run = [path.components for path in model.scene.trajectory if path.point == tip], source.closer
-    known, rest = (run.time, _position(run.model, run.q, tip)), commanded_rest(source)
-    last = None if rest is None else (rest.since, _position(rest.model, rest.q[None], tip)[0])
-    return partial(place_of_tip, end=analysis.last_time, known=known, paths=paths, last=last)
+    """Where the tip should be (T, d), m, at times (T,), s: on its paths, constant before 0 and after their end.
+
+    Without a path where it is in the inverse analysis. There it may ring: from when all paths are over, its place is
+    the final position.
+    """
+    paths = [path.components for path in model.scene.trajectory if path.point == tip]
+    run, rest = source.closer, commanded_rest(source)
+    known = scipy.interpolate.CubicSpline(run.time, _position(run.model, run.q, tip))
+
+    def place_at(time: Array) -> Array:
+        place: Array = known(time)
+        for components in paths:
+            for component, target in components.items():
+                place[:, "xyz".index(component)] = target.sample(np.clip(time, 0.0, analysis.last_time))[0]
+        if rest is not None:
+            place[time >= rest.since] = _position(rest.model, rest.q[None], tip)[0]
+        return place
+
+    return place_at
 
 
 def _position(model: Model, q: Array, point: str) -> Array:
     return model.tree.places(q).at(model.tree.section(point)).r
+
+
+LONGEST, FEWEST = 64, 12  # samples that are looked at
+AT, LATER = 1, 4  # sample at which readings are off: the first may be special; and that of all together
+SIZES = 1e-4, 1e-7, 1e-10  # of how far readings are off in the run, until commands are linear in them
+LINEAR = 0.02  # of the largest change of each command: what several readings may change of their sum, later and twice
+RANK = 1e-8  # of the largest singular value: less is round-off
+SAME = 1e-3  # of the largest response: what the states found may leave of it
+
+
+def find_feedback(setup: Setup, controllers: Sequence[Controller], readings: Array, first: int) -> Feedback | None:
+    """The controllers about the reference from sample `first` on, much nearer to it than the `readings` (K, outputs).
+
+    Each reading is off at one sample alone. The change of what is then commanded is the controllers' impulse response;
+    its Hankel matrix has the rank of their states, and these as factors (B. L. Ho and R. E. Kalman, Regelungstechnik
+    14, 1966; S. Y. Kung, Asilomar Conf. 1978). None where that is no linear map that stays the same from sample to
+    sample, with few states.
+    """
+    count = min(LONGEST, len(setup.times) - first)
+    if count < FEWEST:
+        return None
+    reference, off = setup.reference[first : first + count], readings - setup.reference[: len(readings)]
+    size = np.abs(off).max(axis=0, initial=0.0)
+    size[size == 0.0] = 1.0
+
+    def commands(changes: Array) -> Array:
+        acting = [copy(controller) for controller in controllers]  # as they begin
+        found = np.zeros((count, len(setup.inputs)))
+        for k, y in enumerate(reference + changes):
+            for controller in acting:
+                found[k] += controller(first + k, y)
+        return found
+
+    try:
+        with np.errstate(all="ignore"), redirect_stdout(StringIO()):  # once more, of what it printed
+            still = commands(np.zeros_like(reference))
+            for share in SIZES:
+                a, answers = share * size, np.zeros((len(size), *still[AT:].shape))
+                for j, each in enumerate(np.diag(a)):
+                    change = np.zeros_like(reference)
+                    change[AT] = each
+                    answers[j] = (commands(change) - still)[AT:]
+                signs = 2.0 * (-1.0) ** np.arange(len(a))
+                together = np.zeros_like(reference)
+                together[LATER] = signs * a
+                seen, expected = commands(together) - still, np.zeros_like(still)
+                expected[LATER:] = np.tensordot(signs, answers[:, : count - LATER], 1)
+                if np.abs(seen - expected).max(initial=0.0) <= LINEAR * np.abs(expected).max(initial=0.0):
+                    return _realized(setup, np.moveaxis(answers, 0, 2), a)
+    except SolveError:
+        pass
+    return None
+
+
+def _realized(setup: Setup, answers: Array, a: Array) -> Feedback | None:
+    """The least states whose commands are `answers` (samples, inputs, outputs) to readings that are off by `a`."""
+    size = np.abs(answers).max(axis=(1, 2), initial=0.0)
+    grown = float(np.abs(answers[len(answers) // 2 :]).max(initial=0.0)) / (float(size[: len(size) // 2].max()) or 1.0)
+    growth = max(grown, 1.0) ** (2.0 / len(answers))  # a sample, of controllers that are unstable by themselves
+    answers = answers / growth ** np.arange(len(answers))[:, None, None]
+    size = np.abs(answers).max(axis=(0, 2), initial=0.0)
+    size[size == 0.0] = 1.0
+    scaled = answers / size[:, None]
+    inputs, outputs, later = len(size), len(a), scaled[1:]
+    half = len(later) // 2
+    blocks = [np.concatenate(later[k : k + half]) for k in range(len(later) - half + 1)]
+    U, values, V = np.linalg.svd(np.hstack(blocks[:-1]), full_matrices=False)
+    largest = float(np.abs(scaled).max(initial=0.0))
+    rank = int(np.count_nonzero(values > RANK * max(values.max(initial=0.0), largest)))
+    root = np.sqrt(values[:rank])
+    A = (U[:, :rank].T @ np.hstack(blocks[1:]) @ V[:rank].T) / root[:, None] / root
+    B, C = root[:, None] * V[:rank, :outputs], U[:inputs, :rank] * root
+    x = B
+    for expected in later:
+        if np.abs(C @ x - expected).max(initial=0.0) > SAME * largest:
+            return None
+        x = A @ x
+    return Feedback(growth * A, growth * B / a, size[:, None] * C, answers[0] / a, setup.inputs, setup.outputs)

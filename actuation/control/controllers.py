@@ -1,4 +1,4 @@
-"""Controllers: their protocol and choice, joint PID, modal velocity, computed torque, functions of Python.
+"""Controllers: joint PID, modal velocity, linear-quadratic, computed torque, functions of Python; their protocol.
 
 A user's own controller: a function in a Python file that is given the setup and returns what is asked at samples.
 
@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import runpy
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
@@ -28,7 +29,16 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError, SolveError
 from ...common.python_files import count_failed, count_imports, imported_files
-from .lqr import LqrControl
+from .linear_model import (
+    LinearModel,
+    SampledModel,
+    controllability,
+    kept_modes,
+    observability,
+    riccati,
+    sampled,
+    state_space,
+)
 from .records import ComputedTorque, JointPid, Lqr, ModalVelocity, StateFeedback
 from .records import Controller as Record
 from .robot import RigidArm, Setup, estimate
@@ -37,7 +47,7 @@ from .robot import RigidArm, Setup, estimate
 class Controller(Protocol):
     """Protocol of controllers, which are called at each sample and may keep a state.
 
-    `bandwidth` (rad/s): the fastest motion that it means to act on; 0 where it does not say.
+    `bandwidth` (rad/s): the fastest motion that it acts on; 0 where not known.
     """
 
     bandwidth: float
@@ -76,8 +86,12 @@ class LinearFeedback:
         return u
 
 
-def joint_pid(record: JointPid, setup: Setup, mobility: Array) -> LinearFeedback:
-    """PID of joints; `mobility` (motors,) is the acceleration of each joint per moment on it, for the bandwidth."""
+def joint_pid(record: JointPid, setup: Setup) -> LinearFeedback:
+    """Make the PID controller of joints; its bandwidth is that at the start with rigid links and other joints free."""
+    mobility = np.zeros(len(setup.robot.motors))  # 1/(kg·m²) or 1/kg, acceleration of each joint per torque
+    if setup.robot.motors_fit:
+        arm = setup.robot.rigid()
+        mobility = np.diag(np.linalg.inv(arm.terms(arm.angles(), mobility)[0]))
     shape = (len(setup.inputs), len(setup.outputs))
     P, D, integral = (np.zeros(shape) for _ in range(3))
     bandwidth = 0.0
@@ -95,7 +109,7 @@ def joint_pid(record: JointPid, setup: Setup, mobility: Array) -> LinearFeedback
 
 
 def modal_velocity(record: ModalVelocity, setup: Setup) -> LinearFeedback:
-    """Voltages for the modal forces −2 ζ ω ṗ of the lowest modes, which spill into others only where they must."""
+    """Make the controller of voltages for modal forces −2 ζ ω ṗ of the lowest modes, with least spill into others."""
     G = np.zeros((len(setup.inputs), len(setup.outputs)))
     bandwidth = 0.0
     for name in record.bodies:
@@ -128,10 +142,7 @@ def state_feedback(record: StateFeedback, setup: Setup) -> LinearFeedback:
 
 
 class ComputedTorqueControl:
-    """Moments for γ̈_ref + 2 ζ ω ė + ω² e with rigid links (Craig, Introduction to Robotics, sec. 10.4).
-
-    They replace the moments of the feed-forward, which are taken off.
-    """
+    """Torques for γ̈_ref + 2 ζ ω ė + ω² e with rigid links, less the feed-forward (Craig, Intro. to Robotics, 10.4)."""
 
     def __init__(self, record: ComputedTorque, setup: Setup, arm: RigidArm) -> None:
         motors = setup.robot.motors
@@ -168,7 +179,7 @@ class PythonControl:
             raise SolveError(f"{label}: expected it to return a function (k, y) → u", f"{self.act!r}")
 
     def __call__(self, k: int, y: Array) -> Array:
-        """What the user's function commands at sample k."""
+        """Return the commands (inputs,) of the user's function at sample k."""
         try:
             u = np.asarray(self.act(k, y), dtype=float)
         except (Exception, SystemExit) as error:  # the user's code may raise anything
@@ -180,7 +191,7 @@ class PythonControl:
         return u
 
     def __copy__(self) -> PythonControl:
-        """As at the start of a run: what the user's function remembers cannot be copied."""
+        """Make the controller anew, as at the start of a run: the state of the user's function cannot be copied."""
         return PythonControl(*self.made_by)
 
     def _at(self, k: int) -> str:
@@ -193,10 +204,10 @@ def _in_words(error: BaseException) -> str:
 
 
 def load_function(reference: str, folder: Path) -> Callable[[Setup], Callable[[int, Array], Array]]:
-    """The function of "FILE.py:FUNCTION" of a scene in `folder`.
+    """Return the function of "FILE.py:FUNCTION" of a scene in `folder`.
 
-    What the file imports from below there counts among `python_files.imported_files`. Raises `InputError` where the
-    file fails or does not have the function.
+    Its imports from below `folder` count among `python_files.imported_files`. Raises `InputError` where the file fails
+    or does not have the function.
     """
     path, _, name = reference.rpartition(":")
     count_imports(folder, Path(path).parent)
@@ -212,36 +223,179 @@ def load_function(reference: str, folder: Path) -> Callable[[Setup], Callable[[i
 
 
 def make_controllers(records: Sequence[Record], setup: Setup) -> list[Controller]:
-    """All controllers of an analysis."""
-    return [make_controller(record, setup, records) for record in records]
+    """Make the controllers of an analysis from its tables. Raises `InputError` where one does not fit the robot."""
+    made: list[Controller] = []
+    for record in records:
+        if isinstance(record, JointPid):
+            made.append(joint_pid(record, setup))
+        elif isinstance(record, ModalVelocity):
+            made.append(modal_velocity(record, setup))
+        elif isinstance(record, StateFeedback):
+            made.append(state_feedback(record, setup))
+        elif isinstance(record, ComputedTorque):
+            made.append(ComputedTorqueControl(record, setup, setup.robot.rigid()))
+        elif isinstance(record, Lqr):
+            made.append(LqrControl(record, setup, [other for other in records if isinstance(other, JointPid)]))
+        else:
+            path, function = setup.robot.path, record.python
+            if isinstance(function, str):
+                function = load_function(function, path.parent)
+            made.append(PythonControl(function, setup, f"{path}: controller: {record.python}"))
+    return made
 
 
-def make_controller(record: Record, setup: Setup, beside: Sequence[Record]) -> Controller:
-    """Make the controller of one table of the scene; `beside`: the tables of all that act together.
+MOST_STATES = 500  # with which the Riccati equation takes seconds, not minutes
 
-    Raises `InputError` where it does not fit the robot.
+
+def gains(model: SampledModel, Q: Array, R: Array) -> Array:
+    """Return K (m, n) of u = −K x with least Σ xᵀQx + uᵀRu; Q (k, k) weights the first k states, the rest are delays.
+
+    Q and R (m, m) are diagonal. Raises `ValueError` where the Riccati equation has no stabilizing solution.
     """
-    if isinstance(record, JointPid):
-        return joint_pid(record, setup, joint_mobility(setup))
-    if isinstance(record, ModalVelocity):
-        return modal_velocity(record, setup)
-    if isinstance(record, StateFeedback):
-        return state_feedback(record, setup)
-    if isinstance(record, ComputedTorque):
-        return ComputedTorqueControl(record, setup, setup.robot.rigid())
-    if isinstance(record, Lqr):
-        return LqrControl(record, setup, [other for other in beside if isinstance(other, JointPid)])
-    label = f"{setup.robot.path}: controller: {record.python}"
-    folder = setup.robot.path.parent
-    function = load_function(record.python, folder) if isinstance(record.python, str) else record.python
-    return PythonControl(function, setup, label)
+    n, waiting = len(Q), (len(model.A) - len(Q)) // len(R)
+    # in the unit of what is acceptable: all weights are one
+    scale = np.concatenate([1 / np.sqrt(np.diag(Q)), *[1 / np.sqrt(np.diag(R))] * waiting])
+    unit = 1 / np.sqrt(np.diag(R))
+    A, B = model.A * scale / scale[:, None], model.B * unit / scale[:, None]
+    weight = np.diag(np.concatenate([np.ones(n), np.full(len(A) - n, 1e-9)]))
+    X = riccati(A, B, weight, np.eye(len(R)))
+    K = np.linalg.solve(np.eye(len(R)) + B.T @ X @ B, B.T @ X @ A)
+    return unit[:, None] * K / scale
 
 
-def joint_mobility(setup: Setup) -> Array:
-    """Return acceleration per torque (motors,), 1/(kg·m²) or 1/kg, at the start; links rigid, other joints free."""
-    rest = np.zeros(len(setup.robot.motors))
-    if not setup.robot.motors_fit:
-        return rest
-    arm = setup.robot.rigid()
-    M, _ = arm.terms(arm.angles(), rest)
-    return np.diag(np.linalg.inv(M))
+class LqrControl:
+    """Feedback u = −K x of joint errors, the links' lowest modes, their rates, and the commands not yet in effect."""
+
+    def __init__(self, record: Lqr, setup: Setup, beside: Sequence[JointPid]) -> None:
+        model = design_model(record, setup, beside if record.inputs == "patches" else ())
+        motors = [] if record.inputs == "patches" else [f"joint/{name}" for name in setup.robot.motors]
+        patches = {} if record.inputs == "motors" else setup.robot.patches
+        acting = [*setup.places(*motors), *(i for body in patches for i in setup.patch_places(body))]
+        left_out = {of for of in setup.inputs if record.pzt is not None and of.split("/")[1] not in record.pzt}
+        self.inputs = [i for i in acting if not setup.inputs[i].startswith("pzt/") or setup.inputs[i] not in left_out]
+        names = [setup.inputs[i] for i in self.inputs]
+        if not names:
+            raise InputError(f"{setup.robot.path}: controller lqr: expected motors or patches as inputs", "none")
+        self.warnings = _out_of_reach(record, setup, model, names)
+        Q, R = _weights(record, setup, model, names)
+        waiting = int(np.ceil(setup.delay / setup.sample_time)) * len(names)
+        if len(model.A) + waiting > MOST_STATES:
+            raise InputError(
+                f"{setup.robot.path}: controller lqr: expected at most {MOST_STATES} states",
+                f"{len(model.A)} of the model and {waiting} commands on their way: a shorter delay or fewer inputs",
+            )
+        discrete = sampled(model.A, model.B[:, model.inputs(names)], setup.sample_time, setup.delay)
+        try:
+            self.K = gains(discrete, Q, R)
+        except ValueError as error:
+            raise InputError(
+                f"{setup.robot.path}: controller lqr: expected a model that motors and patches can stabilize",
+                f"none ({error}): {'; '.join(self.warnings) or 'more modes or other weights?'}",
+            ) from None
+        # the fastest of the model's motions that feedback changes: whose discrete pole moves
+        poles = np.linalg.eigvals(model.A)
+        closed = np.linalg.eigvals(discrete.A - discrete.B @ self.K)
+        moved = np.abs(np.exp(poles * setup.sample_time)[:, None] - closed).min(axis=1) > 0.05
+        self.bandwidth = float(np.abs(poles[moved]).max(initial=0.0))
+        self.values, self.rates, differences = _estimates(record, setup, model)
+        unread = [name for name, row in zip(model.state_names, self.values, strict=False) if not row.any()]
+        if unread:
+            self.warnings += (f"LQR: no sensor reads {', '.join(unread)}, taken for 0: an observer estimates them",)
+        self.differences = differences / setup.sample_time
+        self.reference, self.f = setup.reference, model.freedom
+        self.x = np.zeros(len(discrete.A))
+        self.before: Array | None = None
+        self.size = len(setup.inputs)
+
+    def __call__(self, k: int, y: Array) -> Array:
+        """Commands at sample k."""
+        e = y - self.reference[k]
+        change = e - (e if self.before is None else self.before)
+        self.before = e
+        x, f = self.x.copy(), self.f
+        x[:f] = self.values @ e
+        x[f : 2 * f] = self.rates @ e + self.differences @ change
+        command = -self.K @ x
+        if len(x) > 2 * f:
+            x[2 * f : -len(command)] = x[2 * f + len(command) :]
+            x[-len(command) :] = command
+        self.x = x
+        u = np.zeros(self.size)
+        u[self.inputs] = command
+        return u
+
+
+def design_model(record: Lqr, setup: Setup, beside: Sequence[JointPid]) -> LinearModel:
+    """Return the linear model for the design: about the reference at `time`, with the lowest modes of links.
+
+    Springs and dampers replace the controllers `beside`, without sampling and delay.
+    """
+    mechanism, voltages = setup.robot.linear(int(np.argmin(np.abs(setup.source.time - record.time))))
+    mechanism, voltages = kept_modes(mechanism, voltages, record.modes)
+    for pid in beside:
+        for joint, name in setup.robot_coordinates(pid.joints):
+            held = np.outer(mechanism.inputs[f"joint/{name}"], mechanism.outputs[f"{pid.side}/{name}"])
+            spring, damper = pid.proportional.get(joint, 0.0), pid.derivative.get(joint, 0.0)
+            mechanism = replace(mechanism, K=mechanism.K + spring * held, D=mechanism.D + damper * held)
+    return state_space(mechanism, voltages)
+
+
+def _weights(record: Lqr, setup: Setup, model: LinearModel, inputs: Sequence[str]) -> tuple[Array, Array]:
+    """Q and R (diagonal); pᵀp/m is the mean square of a link's deflection."""
+    values, rates = [], []
+    for name in model.state_names[: model.freedom]:
+        kind, body, *rest = name.split("/")
+        if kind != "modal":
+            values.append(record.angle**-2)
+            rates.append(record.rate**-2)
+            continue
+        link = setup.robot.links[body]
+        weight = 1 / (link.mass * (record.deflection * (link.length or 1.0)) ** 2)
+        values.append(weight)
+        rates.append(weight / link.stiffness[int(rest[0]) - 1])
+    cost = [record.moment if name.startswith("joint/") else record.voltage for name in inputs]
+    return np.diag([*values, *rates]), np.diag(np.array(cost) ** -2.0)
+
+
+def _estimates(record: Lqr, setup: Setup, model: LinearModel) -> tuple[Array, Array, Array]:
+    """Matrices (f, outputs) from readings to coordinates, to measured rates, and to rates by differences (times T)."""
+    values, rates, differences = np.zeros((3, model.freedom, len(setup.outputs)))
+    names = list(model.state_names[: model.freedom])
+    if setup.has_estimates:
+        every = range(model.freedom)
+        values[every, setup.columns(*(f"estimate/{name}" for name in names))] = 1.0
+        rates[every, setup.columns(*(f"estimate/{name}/rate" for name in names))] = 1.0
+        return values, rates, differences
+    for name in _rigid_outputs(setup):
+        i = names.index(name)
+        values[i, setup.columns(name)] = 1.0
+        rates[i, setup.columns(f"{name}/rate")] = 1.0
+    for body in setup.robot.links:
+        rows = np.array([i for i, name in enumerate(names) if name.startswith(f"modal/{body}/")], dtype=int)
+        m = len(rows)
+        if record.sensor == "ideal":
+            values[np.ix_(rows, setup.modal_columns(body, m, ""))] = np.eye(m)
+            rates[np.ix_(rows, setup.modal_columns(body, m))] = np.eye(m)
+        elif m and (link := setup.robot.patches.get(body)) is not None:
+            known = estimate(link.volts @ link.own, m)
+            at = np.ix_(rows[: len(known)], setup.columns(*link.inputs))
+            values[at] = differences[at] = known
+    return values, rates, differences
+
+
+def _out_of_reach(record: Lqr, setup: Setup, model: LinearModel, inputs: Sequence[str]) -> tuple[str, ...]:
+    """Modes that no input of the design reaches, or no sensor sees."""
+    lost = controllability(model, list(inputs)).lost
+    lines = [f"LQR: uncontrollable: {', '.join(lost)}"] if lost else []
+    if setup.has_estimates:
+        return tuple(lines)
+    seen = _rigid_outputs(setup)
+    bending = setup.robot.links if record.sensor == "ideal" else setup.robot.patches
+    seen += [n for n in model.output_names if n.startswith("modal/") and n.split("/")[1] in bending]
+    hidden = observability(model, seen).lost
+    return (*lines, *([f"LQR: unobservable: {', '.join(hidden)}"] if hidden else []))
+
+
+def _rigid_outputs(setup: Setup) -> list[str]:
+    joints = [f"joint/{name}" for name in setup.robot.motors]
+    return [*joints, *(f"motor/{name}" for name in setup.robot.elastic_joints)]

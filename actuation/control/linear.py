@@ -9,7 +9,7 @@ from typing import Literal
 
 from ...common.arrays import Array
 from ...common.structs import struct
-from ...mbs.analysis.operating_points import InstantAnalysis, OperatingPoints, find_operating_points, places_of
+from ...mbs.analysis.operating_points import InstantAnalysis, find_operating_points, places_of
 from ...mbs.fields.field_types import PointReference, Reference, under
 from ...mbs.linear.joint_conditions import JointCondition, RobotModes, joint_conditions
 from ...mbs.linear.linearisation import LinearEquations, LinearMechanism
@@ -20,15 +20,16 @@ from ..patches.link_patches import LinkPatches
 from .linear_model import (
     LinearModel,
     Reachability,
+    Zeros,
     controllability,
     observability,
     robot_modes,
     state_space,
+    zeros,
 )
 from .margins import Suggestion, unhurried_gains
-from .sensor_records import Sensor
+from .records import Sensor
 from .signals import make_signals, readings_at
-from .zeros import Zeros, zeros
 
 MOST_WORK = 2e8  # pairs whose zeros are computed, times cubed coordinates: some seconds
 
@@ -48,8 +49,8 @@ class LinearModels(Details):
     controllable: tuple[Reachability, ...]
     observable: tuple[Reachability, ...]
     zeros: Mapping[tuple[str, ...], tuple[Zeros, ...]]
-    suggested: tuple[Suggestion, float] | None = None
-    conditions: tuple[Mapping[str, JointCondition], ...] = ()
+    suggested: tuple[Suggestion, float] | None
+    conditions: tuple[Mapping[str, JointCondition], ...]
 
     @property
     def times(self) -> tuple[float, ...]:
@@ -58,28 +59,11 @@ class LinearModels(Details):
 
     @property
     def advice(self) -> str:
-        """Gains for the motors to start with, in words; empty where none are known."""
+        """Gains for the motors to start with, as text; empty where none are known."""
         if self.suggested is None:
             return ""
         gains, sample_time = self.suggested
         return f"joint PID to start with: {gains.in_words()}, sampled every {1e3 * sample_time:g} ms or faster"
-
-
-def _analyse(models: tuple[LinearModel, ...]) -> LinearModels:
-    first = models[0]
-    acting = [name for name in first.input_names if not name.startswith("force/")]
-    seen = [name for name in first.output_names if not name.startswith("modal/")]
-    return LinearModels(
-        models,
-        tuple(robot_modes(model) for model in models),
-        tuple(controllability(model, acting) for model in models),
-        tuple(observability(model, seen) for model in models),
-        {
-            pair: tuple(zeros(model, pair[: len(pair) // 2], pair[len(pair) // 2 :]) for model in models)
-            for pair in _pairs(first)
-        },
-        unhurried_gains(models),
-    )
 
 
 def _pairs(model: LinearModel) -> list[tuple[str, ...]]:
@@ -112,7 +96,7 @@ class Linear(InstantAnalysis):
     refers_to = (("points", "body"),)
 
     def references(self) -> Iterator[Reference]:
-        """Yield references to what is measured, too."""
+        """Yield references to points and to what is measured."""
         yield from super().references()
         for k, sensor in enumerate(self.sensor, 1):
             yield from under(f"sensor no. {k}", sensor.references())
@@ -120,25 +104,34 @@ class Linear(InstantAnalysis):
     def run(self, context: ActuatedContext) -> Run:
         """The operating points, with `LinearModels` about them. Raises `SolveError` in singular postures."""
         run, about = find_operating_points(context, self)
-        return replace(run, details=make_linear_models(context, self, about))
-
-
-def make_linear_models(context: ActuatedContext, analysis: Linear, about: OperatingPoints) -> LinearModels:
-    """About these states. Points have the names of the scene, modes those of the model, also of links in pieces."""
-    free = about.model
-    linearization = LinearEquations(free, about.q[0], places_of(context, analysis.points))
-    mechanisms = [
-        linearization.at(float(t), q, v, a) for t, q, v, a in zip(about.time, about.q, about.v, about.a, strict=True)
-    ]
-    signals = make_signals(free, context, analysis.sensor, context.whole)
-    models = [
-        state_space(one, voltages_at(free, one, context.patches), readings_at(free, one, signals)) for one in mechanisms
-    ]
-    return replace(_analyse(tuple(models)), conditions=tuple(map(joint_conditions, mechanisms)))
+        free = about.model
+        linearization = LinearEquations(free, about.q[0], places_of(context, self.points))
+        states = zip(about.time, about.q, about.v, about.a, strict=True)
+        mechanisms = [linearization.at(float(t), q, v, a) for t, q, v, a in states]
+        signals = make_signals(free, context, self.sensor, context.whole)
+        models = tuple(
+            state_space(one, voltages_at(free, one, context.patches), readings_at(free, one, signals))
+            for one in mechanisms
+        )
+        acting = [name for name in models[0].input_names if not name.startswith("force/")]
+        seen = [name for name in models[0].output_names if not name.startswith("modal/")]
+        details = LinearModels(
+            models=models,
+            modes=tuple(robot_modes(model) for model in models),
+            controllable=tuple(controllability(model, acting) for model in models),
+            observable=tuple(observability(model, seen) for model in models),
+            zeros={
+                pair: tuple(zeros(model, pair[: len(pair) // 2], pair[len(pair) // 2 :]) for model in models)
+                for pair in _pairs(models[0])
+            },
+            suggested=unhurried_gains(models),
+            conditions=tuple(map(joint_conditions, mechanisms)),
+        )
+        return replace(run, details=details)
 
 
 def voltages_at(model: Model, mechanism: LinearMechanism, patches: Mapping[str, LinkPatches]) -> dict[str, Array]:
-    """Return, by "pzt/LAYOUT/k", the generalized force (f,) along s per volt, on modes of the link or its pieces."""
+    """Return generalized forces (f,) along s of 1 V by name "pzt/LAYOUT/k", N·m/V or their like."""
     found: dict[str, Array] = {}
     for of_link in patches.values():
         along_s = model.modal_directions(of_link.per_volt) @ mechanism.transformation

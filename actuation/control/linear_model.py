@@ -1,8 +1,9 @@
-"""A robot as x' = A x + B u, y = C x + D u, its modes, and which of them inputs and outputs reach."""
+"""A robot as x' = A x + B u, y = C x + D u: its modes, what inputs and outputs reach, zeros, and the sampled model."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import fields, replace
 from functools import cached_property
 from io import BytesIO
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...common.arrays import Array, ComplexArray, as_floats
+from ...common.arrays import Array, ComplexArray, Indices, NDArray, as_floats
 from ...common.errors import InputError, check_known, quoted
 from ...common.files import write_atomically
 from ...common.libraries import extras, scipy
@@ -33,8 +34,8 @@ class StateSpace:
     """x' = A x + B u, or x(k+1) = A x + B u every `step` s; y = C x + D u, with names of states, inputs and outputs.
 
     Attributes:
-        A, B, C, D: (n, n), (n, inputs), (outputs, n), (outputs, inputs).
-        time: s, of the motion, about which it is linear.
+        A, B, C, D: (n, n), (n, inputs), (outputs, n), (outputs, inputs), SI units.
+        time: instant of the motion about which it is linear, s.
     """
 
     A: Array
@@ -48,7 +49,7 @@ class StateSpace:
 
     @property
     def step(self) -> float:
-        """Between samples, s; 0 of continuous time."""
+        """Time between samples, s; 0 of continuous time."""
         return 0.0
 
     def inputs(self, names: Names) -> list[int]:
@@ -60,7 +61,7 @@ class StateSpace:
         return _numbers("output", names, self.output_names)
 
     def arrays(self) -> dict[str, Any]:
-        """Arrays and names of the model, as files contain them."""
+        """Return arrays, names and `time` of the model, as files contain them."""
         return {one.name: getattr(self, one.name) for one in fields(self)}
 
     def save(self, path: Path) -> None:
@@ -68,12 +69,10 @@ class StateSpace:
         save_arrays(self.arrays(), path)
 
     def to_control(self, inputs: Names | None = None, outputs: Names | None = None) -> control.StateSpace:
-        """State-space model of python-control (extra "control"), with ":" instead of "." in names.
+        """Return a state-space model of python-control (extra "control"), with ":" instead of "." in names.
 
-        Of samples it has their `step` as dt.
-
-        From `inputs` to `outputs` by their names here, in that order; all where they are not given. Raises `InputError`
-        for unknown ones.
+        From `inputs` to `outputs` by name, in that order; None: all. A sampled model has `step` as dt. Raises
+        `InputError` for unknown names.
         """
         with extras():
             import control
@@ -92,7 +91,7 @@ class StateSpace:
 
 @struct
 class SampledController(StateSpace):
-    """Controllers of a loop, with their observer: from readings to commands, off the reference.
+    """Controllers of a loop with their observer: from readings to commands, off the reference.
 
     Readings are those of sensors, behind their filters and delays; commands are those before limits.
     """
@@ -101,7 +100,7 @@ class SampledController(StateSpace):
 
     @property
     def step(self) -> float:
-        """Between samples, s."""
+        """Time between samples, s."""
         return self.sample_time
 
 
@@ -115,7 +114,7 @@ class LinearModel(StateSpace):
         state_names: "joint/NAME", "modal/BODY/k", … and their rates, "rate of joint/NAME", …
         input_names: "joint/NAME" N·m (or N), "pzt/BODY/k" V, "force/BODY.POINT/x" N; k from 1.
         output_names: "joint/NAME" rad (or m), "point/BODY.POINT/x" m, "modal/BODY/k"; of sensors as of `Signal`.
-        mass: (f, f) mass matrix of s: the metric that compares coordinates of different kinds.
+        mass: (f, f) mass matrix of s, SI units: the metric that compares coordinates of different kinds.
         transformation: (coordinates, f) ∂q/∂s, which takes mode shapes to the robot.
     """
 
@@ -137,15 +136,15 @@ class LinearModel(StateSpace):
 
     @cached_property
     def second_order(self) -> tuple[Array, Array, Array, Array]:
-        """K̂, D̂ (f, f), inputs (f, …) and outputs (…, f) for unit mass: s = L⁻ᵀ z, mass = L Lᵀ."""
-        f, L = self.freedom, np.linalg.cholesky(self.mass)
-        L_T, inverse = L.T, np.linalg.inv(L.T)
+        """K̂ (f, f) rad²/s², D̂ (f, f) 1/s, inputs (f, …), outputs (…, f) for unit mass: s = L⁻ᵀ z, mass = L Lᵀ."""
+        f, L_T = self.freedom, np.linalg.cholesky(self.mass).T
+        inverse = np.linalg.inv(L_T)
         A_K, A_D = L_T @ self.A[f:, :f] @ inverse, L_T @ self.A[f:, f:] @ inverse
         inputs, outputs = L_T @ self.B[f:], self.C[:, :f] @ inverse
         return -1.0 * A_K, -1.0 * A_D, inputs, outputs
 
     def frequency_response(self, omega: Array, inputs: Names, outputs: Names) -> ComplexArray:
-        """Frequency response G(iω) (len(omega), outputs, inputs) at ω, rad/s."""
+        """Return the frequency response G(iω) (F, outputs, inputs) at `omega` (F,), rad/s; SI units."""
         K, D, B, _ = self.second_order
         s, f = 1j * np.asarray(omega)[:, None, None], self.freedom
         columns, rows = self.inputs(inputs), self.outputs(outputs)
@@ -160,9 +159,10 @@ def state_space(
     voltages: Mapping[str, Array],
     readings: Mapping[str, tuple[Array, Array, Array]] = MappingProxyType({}),
 ) -> LinearModel:
-    """Return the state space of a linear mechanism; `voltages` by name: generalized forces (f,) of 1 V along s.
+    """Return the state space of a linear mechanism with voltages and sensors.
 
-    `readings`: changes (f,) of each sensor's by s, ṡ and s̈, which are outputs too.
+    `voltages` by name: generalized forces (f,) of 1 V along s, N·m/V or their like. `readings` by name: derivatives
+    (f,) of each output by s, ṡ and s̈.
     """
     f = len(mechanism.M)
     motors = {name: column for name, column in mechanism.inputs.items() if name.startswith("joint/")}
@@ -193,7 +193,7 @@ def state_space(
 
 
 def is_kept(name: str, modes: int) -> bool:
-    """Whether a coordinate or reading is none of a mode above the lowest `modes` of its link."""
+    """Whether a coordinate or reading, by name, does not belong to a mode above the lowest `modes` of its link."""
     kind, *rest = name.split("/")
     return kind != "modal" or int(rest[1]) <= modes
 
@@ -235,7 +235,7 @@ def save_arrays(arrays: Mapping[str, Any], path: Path) -> None:
 
 
 def read_arrays(path: Path, names: Sequence[str]) -> list[Array]:
-    """Matrices of a .npz or .mat file. Raises `InputError` where it cannot be read or lacks one."""
+    """Read matrices of a .npz or .mat file by name. Raises `InputError` where it cannot be read or lacks one."""
     try:
         if path.suffix == ".mat":
             held: Mapping[str, Any] = scipy.io.loadmat(path)
@@ -265,14 +265,14 @@ OUT_OF_REACH = 1e-7  # of the largest effect that a unit input can have on a mod
 
 @kept
 def robot_modes(model: LinearModel) -> RobotModes:
-    """Poles and shapes of a model, about a frozen configuration."""
+    """Return poles (1/s) and shapes of a model, about a frozen configuration."""
     K, D, _, _ = model.second_order
     return modes_of(K, D, np.linalg.inv(np.linalg.cholesky(model.mass)).T, model.transformation)
 
 
 @kept
 def locked_frequencies(model: LinearModel) -> Array:
-    """Undamped frequencies, Hz, the lowest first, with the shafts of all motors locked: of NᵀK̂ N, BᵀN = 0."""
+    """Return undamped frequencies (k,), Hz, the lowest first, with all motor shafts locked: of NᵀK̂ N, BᵀN = 0."""
     K, _, B, _ = model.second_order
     N = free_directions(B[:, [k for k, name in enumerate(model.input_names) if name.startswith("joint/")]].T)
     omega = np.sqrt(np.linalg.eigvalsh(N.T @ (K + K.T) @ N / 2).clip(min=0.0))
@@ -348,3 +348,203 @@ def _reach(model: LinearModel, columns: Array, left: bool) -> Reachability:
     names = [f"mode {k} ({f:.4g} Hz)" for k, f in enumerate(modes.frequency, 1)]
     lost = tuple(name for name, reached in zip(names, measure, strict=True) if reached < OUT_OF_REACH)
     return Reachability(measure, lost)
+
+
+INFINITE = 1e3  # times the largest pole: zeros beyond belong to modes that the model has not
+MARGIN = 1e-6  # of a zero's size (and MARGIN of the largest pole, for those near 0): real parts below are round-off
+ROUND_OFF = 1e-13  # of a pencil, relative: what its entries and QZ leave of double precision
+RESOLVED = 1e-3  # relative error of zeros: those that round-off moves by more may as well be infinite
+
+
+@struct
+class Zeros:
+    """The finite zeros (k,), 1/s, from inputs to outputs: those on the left first, the slowest of each side.
+
+    `unstable`: those with positive real part. Without any the transfer is minimum phase (undamped ones on the imaginary
+    axis are allowed); with them, an output that follows a path needs inputs that grow, or begin before the path does.
+    """
+
+    values: ComplexArray
+    unstable: ComplexArray
+
+    @property
+    def minimum_phase(self) -> bool:
+        """Whether there is no zero with positive real part."""
+        return not self.unstable.size
+
+    @property
+    def slowest(self) -> float:
+        """The size of the slowest zero with positive real part, rad/s; infinite where there is none."""
+        return float(np.abs(self.unstable).min(initial=np.inf))
+
+    def describe(self) -> str:
+        """Return number and slowest unstable zero as text."""
+        if self.minimum_phase:
+            return "minimum phase"
+        slowest = self.unstable[np.abs(self.unstable).argmin()]
+        number = f"{slowest.real:.4g}" + (f" ± {abs(slowest.imag):.4g}i" if abs(slowest.imag) > 0 else "")
+        return f"non-minimum phase: {len(self.unstable)} zeros in the right half plane, the slowest {number} rad/s"
+
+
+def zeros(model: LinearModel, inputs: Names, outputs: Names) -> Zeros:
+    """Return the zeros from as many inputs as outputs, by name (transmission zeros where more than one).
+
+    While C z = 0 the inputs act as constraint forces: with bases N of C z = 0 and N_B of Bᵀ z = 0, zeros are the
+    eigenvalues of N_Bᵀ (λ² I + λ D̂ + K̂) N. Of the square pencil [A − λI, B; C, 0], all but its infinite eigenvalues of
+    relative degree two. QZ scatters those of higher degree: an eigenvalue whose distance from infinity is within the
+    error that round-off makes of it (G. W. Stewart and J. Sun, Matrix Perturbation Theory, 1990, VI.2) is infinite.
+    A transfer that is 0, or singular at all s, has none. Raises `InputError` unless both have the same number.
+    """
+    K, D, B, C = model.second_order
+    b, c = B[:, model.inputs(inputs)], C[model.outputs(outputs)]
+    if b.shape[1] != len(c):
+        raise InputError("zeros: expected as many inputs as outputs", f"{b.shape[1]} and {len(c)}")
+    scale = 1.0  # rad/s: the highest frequency of z̈ + D̂ ż + K̂ z = 0, or the size of its coefficients
+    if len(K):
+        scale = float(np.sqrt(np.abs(np.linalg.eigvals(K)).max()))
+        size = max(float(np.sqrt(np.linalg.norm(K, 2))), float(np.linalg.norm(D, 2)))
+        scale = scale if scale > RIGID * size else size or 1.0
+    s = scale * (0.1 + 0.1j)  # any that is no pole
+    passed = c @ np.linalg.solve(s**2 * np.eye(len(K)) + s * D + K, b)
+    weakest = np.linalg.svd(passed, compute_uv=False).min(initial=np.inf)
+    kinds = {model.output_names[k].partition("/")[0] for k in model.outputs(outputs)}
+    peers = [k for k, name in enumerate(model.output_names) if name.partition("/")[0] in kinds]
+    if weakest * np.abs(s) ** 2 <= STILL * np.linalg.norm(C[peers], axis=1).max(initial=0.0) * np.linalg.norm(b):
+        return Zeros(np.zeros(0, dtype=complex), np.zeros(0, dtype=complex))
+    N, N_B = free_directions(c), free_directions(b.T)
+    mass, damping, stiffness = N_B.T @ N, N_B.T @ D @ N / scale, N_B.T @ K @ N / scale**2
+    values, errors = _eigenvalues(mass, as_floats(damping), as_floats(stiffness))
+    margins = np.maximum(MARGIN * np.maximum(np.abs(values), 1.0), errors)
+    side = np.where(np.abs(values.real) > margins, np.sign(values.real), 0.0)
+    order = by_side(values, side)
+    return Zeros(scale * values[order], scale * values[order][side[order] > 0])
+
+
+def by_side(values: ComplexArray, side: Array) -> NDArray[np.int_]:
+    """Return the order (k,) of `values` by their `side` of the imaginary axis, size, and imaginary part.
+
+    Sizes within `MARGIN` of each other count as one: those of conjugates, and of ± s, differ by round-off alone.
+    """
+    size = np.abs(values)
+    order = np.lexsort((size, side))
+    apart = np.diff(size[order]) > MARGIN * np.maximum(size[order][1:], 1.0)
+    group = np.zeros(len(values))
+    group[order[1:]] = np.cumsum(apart | (np.diff(side[order]) > 0))
+    return np.lexsort((values.imag, group))
+
+
+def _eigenvalues(M: Array, D: Array, K: Array) -> tuple[ComplexArray, Array]:
+    """The finite λ of λ² M + λ D + K, and their errors by round-off; M may be singular."""
+    n, unit = len(M), np.eye(len(M))
+    if not n:
+        return np.zeros(0, dtype=complex), np.zeros(0)
+    if not np.any(D):
+        squares, errors = _finite(-K, M, INFINITE**2)
+        roots = np.sqrt(squares)
+        errors /= np.maximum(np.abs(roots), np.sqrt(errors))
+        return np.concatenate([roots, -roots]), np.tile(errors, 2)
+    A = np.block([[np.zeros((n, n)), unit], [-K, -D]])
+    E = np.block([[unit, np.zeros((n, n))], [np.zeros((n, n)), M]])
+    return _finite(A, E, INFINITE)
+
+
+def _finite(A: Array, E: Array, largest: float) -> tuple[ComplexArray, Array]:
+    """Eigenvalues of A − λ E that round-off tells from infinity, and their errors: chordal ones, times 1 + |λ|².
+
+    Those below 1 are far from infinity, though errors of double ones (a free body's, at 0) are estimated without bound.
+    """
+    (alpha, beta), left, right = scipy.linalg.eig(A, E, left=True, homogeneous_eigvals=True)
+    finite = np.abs(alpha) < largest * np.abs(beta)
+    values, left, right = alpha[finite] / beta[finite], left[:, finite].conj(), right[:, finite]
+    of_A, of_E = (np.abs((left * (X @ right)).sum(axis=0)) for X in (A, E))
+    chordal = ROUND_OFF * np.hypot(np.linalg.norm(A), np.linalg.norm(E)) / np.maximum(np.hypot(of_A, of_E), 1e-300)
+    size = np.hypot(1.0, np.abs(values))
+    resolved = (chordal * size < RESOLVED) | (np.abs(values) < 1.0)
+    return values[resolved].astype(complex), (chordal * size**2)[resolved]
+
+
+@struct
+class SampledModel:
+    """x(k+1) = A x(k) + B u(k) of a model with inputs that are constant between samples and act after a delay.
+
+    Commands that are on their way are states behind those of the model, oldest first.
+    """
+
+    A: Array
+    B: Array
+    last: Indices  # (inputs,) states that are the commands which act until the sample
+
+
+def sampled(A: Array, B: Array, T: float, delay: float | Array, *, with_last: bool = False) -> SampledModel:
+    """Return the exact discrete model of x' = A x + B u, A (n, n), B (n, m), for samples every T (s).
+
+    See Åström and Wittenmark, Computer-Controlled Systems, sec. 2.3. `delay` (s) of all inputs, or of each.
+    `with_last`: without delay, too, the last command, which acts until the sample, is a state.
+    """
+    n, m = B.shape
+    late, fraction = np.divmod(np.broadcast_to(delay, m), T)
+    is_whole = fraction <= 1e-9 * T
+    ages = np.maximum(late + ~is_whole, int(with_last)).astype(int)  # of the command that acts until the sample
+    waiting = int(ages.max(initial=0))
+    Phi, Gamma = zero_order_hold(A, B, T)
+    early = Gamma.copy()
+    for part in np.unique(fraction[~is_whole]):
+        early[:, fraction == part] = zero_order_hold(A, B[:, fraction == part], T - float(part))[1]
+    columns = np.zeros((n + waiting * m, n + (waiting + 1) * m))  # of states, commands on their way, and the new one
+    columns[:n, :n] = Phi
+    columns[n:, n + m :] = np.eye(waiting * m)
+    places = n + m * (waiting - late.astype(int)) + np.arange(m)
+    columns[:n, places] = early
+    columns[:n, (places - m)[~is_whole]] = (Gamma - early)[:, ~is_whole]  # the older one acts first in the interval
+    last = n + m * (waiting - ages) + np.arange(m)
+    return SampledModel(columns[:, : n + waiting * m], columns[:, n + waiting * m :], last)
+
+
+def zero_order_hold(A: Array, B: Array, T: float) -> tuple[Array, Array]:
+    """Return e^{A T} (n, n) and ∫ e^{A s} ds B (n, m) over T (s), balanced, so that units of states do not matter."""
+    n, m = B.shape
+    size = np.ones((n, 1))
+    if n:
+        size[:, 0] = scipy.linalg.matrix_balance(A, permute=False, separate=True)[1][0]  # powers of 2
+    B = B / size
+    scale = float(np.abs(B).max(initial=0.0)) or 1.0
+    block = scipy.linalg.expm(np.block([[A / size * size.T, B / scale], [np.zeros((m, n + m))]]) * T)
+    return size * block[:n, :n] / size.T, size * block[:n, n:] * scale
+
+
+def riccati(A: Array, B: Array, Q: Array, R: Array, within: float = 1.0) -> Array:
+    """Return X (n, n) = AᵀXA − AᵀXB (R + BᵀXB)⁻¹ BᵀXA + Q for which A − B K is stable; for filters give Aᵀ and Cᵀ.
+
+    Raises `ValueError` where there is none with eigenvalues of A − B K `within` that radius.
+    """
+    root = np.linalg.cholesky(R)
+    B = np.linalg.solve(root, B.T).T  # in the units of what is acceptable
+    try:
+        X = scipy.linalg.solve_discrete_are(A, B, Q, np.eye(len(R)))
+    except (scipy.linalg.LinAlgError, ValueError) as error:  # often only its reordering of eigenvalues
+        if (found := by_doubling(A, B, Q)) is None:
+            raise ValueError(str(error)) from None
+        X = found
+    K = np.linalg.solve(np.eye(len(R)) + B.T @ X @ B, B.T @ X @ A)
+    if not np.abs(np.linalg.eigvals(A - B @ K)).max(initial=0.0) < within:
+        raise ValueError("its solution is not stable")
+    return as_floats((X + X.T) / 2)
+
+
+def by_doubling(A: Array, B: Array, X: Array) -> Array | None:
+    """Return X of `riccati` with R = 1 by doubling, from Q on (B. D. O. Anderson, Int. J. Control 28, 1978, 295–306).
+
+    Step k is 2ᵏ of the Riccati recursion. None where it does not converge, or R is below round-off of Bᵀ X B.
+    """
+    unit, G = np.eye(len(A)), B @ B.T
+    with np.errstate(all="ignore"), suppress(np.linalg.LinAlgError):
+        for _ in range(40):  # errors of filters that die out, however slowly, are gone by then
+            W, before = unit + G @ X, X
+            through = np.linalg.solve(W.T, A.T).T
+            X, G = X + A.T @ X @ np.linalg.solve(W, A), G + through @ G @ A.T
+            A, X, G = through @ A, (X + X.T) / 2, (G + G.T) / 2
+            if not (np.isfinite(X).all() and np.isfinite(G).all()):
+                return None
+            if np.abs(X - before).max() <= 1e-10 * np.abs(X).max():  # the next doubling changes its square
+                return X if np.abs(B.T @ X @ B).max(initial=0.0) * np.finfo(float).eps < 1.0 else None
+    return None

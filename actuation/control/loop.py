@@ -1,4 +1,4 @@
-"""What the core asks at every sample of a closed loop, and what a run leaves: samples, metrics, margins, advice."""
+"""The sampled loop that the core calls, and the record of a run: samples, metrics, margins, advice."""
 
 from __future__ import annotations
 
@@ -34,9 +34,6 @@ from .records import ComputedTorque, JointPid, SampledAnalysis
 from .robot import Setup
 from .signals import Filter, Signal
 
-OF_LAG = 2  # steps of the shortest time constant of an amplifier
-OF_RATES = 4  # steps of a sample, at least, where amplifiers limit rates or currents
-MOST = 20  # steps of a sample
 JITTER = 20.0  # times noise and resolution of a sensor: less than so much of motion it may not see
 SAMPLES_PER_PERIOD = 10  # of the fastest motion that a controller acts on (Franklin, Powell and Workman ask for 20)
 
@@ -72,7 +69,7 @@ class Loop:
         return (self.commands[: self.taken] <= lowest) | (self.commands[: self.taken] >= highest)
 
     def __call__(self, k: int, _t: float, y: Array) -> Array:
-        """Commands at sample k for what the sensors are exposed to."""
+        """Return the commands (inputs,) at sample k for the true values y (outputs,) of readings."""
         y = np.minimum(np.maximum(self._filter(y) + self._errors[k], -self._largest), self._largest)
         if self._coarse.size:
             y[self._coarse] = np.round(y[self._coarse] / self._resolution) * self._resolution
@@ -103,8 +100,9 @@ class AmplifiedLoop:
         directions: Array,
         splits: tuple[int, int],
     ) -> None:
+        # steps of a sample: two in the shortest time constant, four where rates or currents have limits, at most 20
         lag = amplifiers.lag[amplifiers.lag > 0.0].min(initial=np.inf)
-        self._parts = int(np.clip(np.ceil(OF_LAG * T / lag), OF_RATES if amplifiers.has_rates else 1, MOST))
+        self._parts = int(np.clip(np.ceil(2 * T / lag), 4 if amplifiers.has_rates else 1, 20))
         self._loop, self._at_sample, self._samples, self._amplifiers = loop, at_sample, samples, amplifiers
         self._directions, self._v, self._h = directions, slice(*splits), T / self._parts
         self.times: Array = (samples[:, None] + self._h * np.arange(self._parts)).ravel()
@@ -116,7 +114,7 @@ class AmplifiedLoop:
         self.first = np.append(self.first[:motors], self._played.at(self._now))
 
     def __call__(self, k: int, t: float, state: Array) -> Array:
-        """Commands in step k."""
+        """Return the commands (inputs,) in step k from t (s) on, for the `state` there."""
         if k % self._parts == 0:
             self._at_sample(k // self._parts, t, state)
         loop, motors = self._loop, len(self.first) - len(self._now)
@@ -140,9 +138,9 @@ class AmplifiedLoop:
 
 
 def measure(run: LoopMotion, setup: Setup, loop: Loop, lowest: float, is_stable: bool | None) -> Metrics:
-    """The metrics of a run; `lowest`: frequency of the robot with its joints controlled or locked, Hz, or NaN.
+    """Return the metrics of a run; `lowest`: frequency of the robot with joints controlled or locked, Hz, or NaN.
 
-    `is_stable`: the sampled linear loop; None where it is not known.
+    `is_stable`: whether the sampled linear loop is stable; None if not known.
     """
     t, motors = run.time, len(setup.robot.motors)
     distance = np.linalg.norm(run.error, axis=1)
@@ -153,8 +151,11 @@ def measure(run: LoopMotion, setup: Setup, loop: Loop, lowest: float, is_stable:
     most = float(np.abs(loop.wanted[taken]).max(initial=0.0)) or 1.0
     asked = setup.times[taken], np.abs(loop.wanted - setup.feed_forward)[taken].max(axis=1, initial=0.0) / most
     lowest, window = ringing(*resting(run.place_at, t), lowest)
+    end, blurred = slice(loop.taken - max(round(RESTING * loop.taken), 1), loop.taken), loop.blur > 0.0
+    moves = np.ptp(loop.readings[end] - setup.reference[end], axis=0)  # by noise and resolution alone?
+    is_seen = not blurred.any() or bool((moves > JITTER * loop.blur)[blurred].any())
     return Metrics(
-        verdict=verdict_of(run, cut, asked, lowest, is_stable, is_seen=_is_seen(loop, setup)),
+        verdict=verdict_of(run, cut, asked, lowest, is_stable, is_seen=is_seen),
         tip_error_rms=root_mean_square(t, distance),
         tip_error_max=largest(t, distance)[0],
         settling_time=settling(t, distance),
@@ -171,13 +172,6 @@ def measure(run: LoopMotion, setup: Setup, loop: Loop, lowest: float, is_stable:
     )
 
 
-def _is_seen(loop: Loop, setup: Setup) -> bool:
-    """Whether sensors move at the end by more than their noise and resolution may be the cause of."""
-    end = slice(loop.taken - max(round(RESTING * loop.taken), 1), loop.taken)
-    moves, blurred = np.ptp(loop.readings[end] - setup.reference[end], axis=0), loop.blur > 0.0
-    return not blurred.any() or bool((moves > JITTER * loop.blur)[blurred].any())
-
-
 @struct
 class LoopRecord(Details):
     """Samples, metrics, margins and advice of a closed loop."""
@@ -185,51 +179,44 @@ class LoopRecord(Details):
     # inputs, outputs: names of commands and readings
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    time: Array  # (K,) s; the last sample is the last that was taken
+    time: Array  # (K,) s, of the samples taken
     readings: Array  # (K, outputs)
-    reference: Array  # (K, outputs) what they would be on the reference motion
+    reference: Array  # (K, outputs) readings on the reference motion
     commands: Array  # (K, inputs) within limits
-    wanted: Array  # before
-    tip_error: Array  # (T,) m at the outputs of the run
+    wanted: Array  # (K, inputs) before limits
     tip_error_peak_time: float  # s, of the largest at all times
-    metrics: Metrics  # how well it went
+    metrics: Metrics
+    margins: Margins | None  # by the linear model; None where controllers, or the robot, are not linear
+    poles: ComplexArray | None  # of the linear loop at the start, from sample to sample
     warnings: tuple[str, ...]  # one line each
-    margins: Margins | None = None  # by the linear model; None where controllers, or the robot, are not linear
     advice: tuple[str, ...] = ()  # what to try, a text each, where the loop is not stable
-    # from readings to commands, off the reference, by time (s): at the start, or along a schedule; none likewise
+    # from readings to commands, off the reference, by time (s): at the start, or along a schedule
     feedback: Mapping[float, Feedback] = field(default_factory=dict)
-    poles: ComplexArray | None = None  # of the linear loop there, from sample to sample
+    tip_error: Array = field(default_factory=lambda: np.zeros(0))  # (T,) m at the outputs of the run
     estimate: Estimates | None = None  # of an observer
 
 
-def sample_times(outputs: Array, T: float) -> Array:
-    """Return sample times (K,), s: every T, from the first output to before the last."""
-    return outputs[0] + np.arange(int(np.ceil(np.ptp(outputs) / T * (1 - 1e-12)))) * T
-
-
-def held_until(times: Array, analysis: SampledAnalysis, end: float) -> Array:
-    """The middle of the time for which the command of each sample is held, up to `end`, s."""
-    return np.minimum(times + analysis.delay + analysis.sample_time / 2, end)
-
-
 def between(times: Array, known: Array, values: Array) -> Array:
-    """Values (T, columns), known at some times, at others (K,)."""
+    """Return values (K, columns) at `times` (K,) by a spline through those (T, columns) at times `known` (T,), s."""
     if not values.size:
         return np.zeros((len(times), values.shape[1]))
     return scipy.interpolate.CubicSpline(known, values)(times)
 
 
 def held_commands(times: Array, samples: Array, delay: float, loop: Loop | AmplifiedLoop, after: float) -> Array:
-    """Commands (T, inputs) in effect `after` seconds past `times` (T,), s, where `samples` are held after `delay`."""
+    """Return the commands (T, inputs) in effect `after` seconds past `times` (T,), s.
+
+    Those of `samples` (K,), s, act `delay` (s) later.
+    """
     taken = slice(loop.taken)
     which = np.searchsorted(samples[taken] + delay, times + after, side="right")
     return np.vstack([loop.first, loop.commands[taken]])[which]
 
 
 def times_of_run(outputs: Array, place_at: Callable[[Array], Array], lowest: float) -> tuple[Array, list[int]]:
-    """Times (T,), s, of a run: its outputs, and those at which vibration about `lowest` (Hz) is measured.
+    """Return times (T,), s, of a run: its outputs, and those at which vibration about `lowest` (Hz) is measured.
 
-    Beside them the rows of the outputs. `place_at` as in `LoopMotion`.
+    With the indices of the outputs among them. `place_at` as in `LoopMotion`.
     """
     frequency, window = ringing(*resting(place_at, outputs), lowest)
     more = watched(float(outputs[-1]), window, frequency)
@@ -242,21 +229,20 @@ def loop_record(
     setup: Setup,
     loop: Loop,
     acting: Sequence[Controller],
-    runs: tuple[LoopMotion, LoopMotion],
+    run: LoopMotion,
     *,
     loops: Loops,
     lowest: float,
     gears: bool,
 ) -> LoopRecord:
-    """Return the record of a run, given at its outputs and at these and between; linear `loops` about the reference.
+    """Return the record of a run at its outputs and between; linear `loops` about the reference.
 
-    `lowest`: as in `measure`. `gears`: some give.
+    `lowest`: as in `measure`. `gears`: whether some are compliant.
     """
-    taken, (at_outputs, run) = slice(loop.taken), runs
+    taken = slice(loop.taken)
     T, delay = analysis.sample_time, analysis.delay
     found = margins(loops, T, delay) if loops else None
     metrics = measure(run, setup, loop, lowest, None if found is None else found.is_stable)
-    tip_error = np.linalg.norm(at_outputs.error, axis=1)
     warnings = tuple(_warnings(analysis, acting, metrics, found, gears))
     pids = [controller for controller in analysis.controller if isinstance(controller, JointPid)]
     texts: list[str] = []
@@ -270,7 +256,6 @@ def loop_record(
         reference=setup.reference[taken],
         commands=loop.commands[taken],
         wanted=loop.wanted[taken],
-        tip_error=tip_error,
         tip_error_peak_time=largest(run.time, np.linalg.norm(run.error, axis=1))[1],
         metrics=metrics,
         warnings=warnings,

@@ -1,15 +1,11 @@
-"""Stability of sampled loops by the linear model.
+"""Stability of sampled loops by the linear model, and gains for joint PD controllers to start with.
 
-The loop is judged as it acts: commands are held between samples and begin `delay` after their reading. Of the model
-sampled exactly (Åström and Wittenmark, Computer-Controlled Systems, sec. 2.3) with the states of the controllers the
-loop x(k+1) = F x(k) is stable where the spectral radius of F is below 1. Margins are by how much all commands of the
-controllers, or the delay, may grow until it is 1.
+Commands are constant between samples and begin `delay` after their reading. With the model sampled exactly (Åström and
+Wittenmark, Computer-Controlled Systems, sec. 2.3) and the states of the controllers, the loop x(k+1) = F x(k) is stable
+where the spectral radius of F is below 1. Margins: by how much all commands, or the delay, may grow until it is 1.
 
-Gains for joint PD controllers to start with, and why a loop is not stable: by the linear model.
-
-The rule is that of flexible structures in general: a bandwidth well below the lowest vibration with locked motors, at
-most half of it by Craig (Introduction to Robotics, sec. 9.9), and critical damping of what the motor then moves, the
-rigid robot. The sampled model has the last word (see `margins`).
+Suggested gains have a bandwidth well below the lowest vibration with locked motors, at most half of it by Craig
+(Introduction to Robotics, sec. 9.9), and critical damping of the rigid robot; the sampled loop must be stable.
 """
 
 from __future__ import annotations
@@ -25,16 +21,12 @@ from ...common.arrays import Array, ComplexArray, as_floats
 from ...common.keys import SMALLEST
 from ...common.structs import struct
 from ...common.toml_files import toml_key
-from .linear_model import LinearModel, locked_frequencies
+from .linear_model import LinearModel, SampledModel, locked_frequencies, sampled
 from .records import ControllerRecord, JointPid, ModalVelocity
-from .sampling import SampledModel, sampled
 
 STABLE = 1.0 + 1e-6  # of a spectral radius: undamped modes and joints without a controller are at 1, to round-off
-LARGEST_GAIN, LEAST_GAIN, LONGEST_DELAY = 1e4, 1e-2, 50.0  # that margins are sought to: factors, and sample times
 FEW, MOST = 150, 600  # eigenvalues of a loop: margins are sought for so many; for more than the second none are found
-PLANTS = 16  # that are kept: gains are sought for the same ones, of several configurations in turn
 GRID = 60  # points of the search for the first crossing, before bisection
-RELATIVE = 1e-3  # to which margins are found
 LIGHTLY = 0.2  # damping ratio, above which motion of a loop is no vibration
 GONE = 1e-6  # eigenvalues below are commands on their way
 ALIAS = 1e-3  # of an eigenvalue: how near it is to that of a vibration that samples are too rare for, and no other
@@ -57,11 +49,11 @@ class Feedback:
     late: Array | None = None
 
     def times(self, factor: float) -> Feedback:
-        """All commands times a factor."""
+        """Return the law with all commands times a factor."""
         return replace(self, C=factor * self.C, D=factor * self.D)
 
     def behind(self, A: Array, B: Array, C: Array, D: Array) -> Feedback:
-        """Behind filters A, B, C, D of its readings, whose states come last."""
+        """Return the law behind discrete filters A (m, m), B, C, D of its readings, whose states come last."""
         if not len(A):
             return self
         whole = np.block([[self.A, self.B @ C], [np.zeros((len(A), len(self.A))), A]])
@@ -89,16 +81,21 @@ class Margins:
 
 
 def joint_gains(model: LinearModel, records: Sequence[JointPid], T: float) -> Feedback:
-    """Joint PID controllers, which add up: −u = P y + D ẏ + D' (y − y₋)/T + I Σ T y with states y₋ and Σ T y."""
+    """Return the law of joint PID controllers, which add up, at samples every T (s).
+
+    −u = P y + D ẏ + D' (y − y₋)/T + I Σ T y with states y₋ and Σ T y.
+    """
     inputs = tuple(model.input_names[k] for k in _motor_inputs(model))
     P, D, difference, integral = (np.zeros((len(inputs), len(model.output_names))) for _ in range(4))
     for record in records:
-        for joint, motor in [(name, motor) for name in record.joints for motor in _motors_of(name, inputs)]:
-            output = motor.replace("joint/", f"{record.side}/", 1)  # with a rigid gear the motor turns as the joint
-            at = inputs.index(motor), model.outputs(output if output in model.output_names else motor)[0]
-            P[at] += record.proportional.get(joint, 0.0)
-            (D if record.rate == "measured" else difference)[at] += record.derivative.get(joint, 0.0)
-            integral[at] += record.integral.get(joint, 0.0)
+        for joint in record.joints:
+            single = f"joint/{joint}"  # or "joint/NAME 1", "joint/NAME 2" of joints with several coordinates
+            for motor in [single] if single in inputs else [name for name in inputs if name.startswith(f"{single} ")]:
+                output = motor.replace("joint/", f"{record.side}/", 1)  # with a rigid gear the motor turns as the joint
+                at = inputs.index(motor), model.outputs(output if output in model.output_names else motor)[0]
+                P[at] += record.proportional.get(joint, 0.0)
+                (D if record.rate == "measured" else difference)[at] += record.derivative.get(joint, 0.0)
+                integral[at] += record.integral.get(joint, 0.0)
     o, none = len(P[0]), np.zeros((len(P[0]), len(P[0])))
     names = (*model.output_names, *(f"{name}/rate" for name in model.output_names))
     used = np.append(difference.any(axis=0), integral.any(axis=0))  # sums without a gain would stay at 1
@@ -110,18 +107,12 @@ def joint_gains(model: LinearModel, records: Sequence[JointPid], T: float) -> Fe
     )  # fmt: skip
 
 
-def _motors_of(joint: str, motors: Sequence[str]) -> list[str]:
-    """Inputs "joint/NAME", or "joint/NAME 1", "joint/NAME 2" of joints with several coordinates."""
-    single = f"joint/{joint}"
-    return [single] if single in motors else [name for name in motors if name.startswith(f"{single} ")]
-
-
 def _motor_inputs(model: LinearModel) -> list[int]:
     return [k for k, name in enumerate(model.input_names) if name.startswith("joint/")]
 
 
 def spectral_radius(model: LinearModel, feedback: Feedback, T: float, delay: float) -> float:
-    """The largest |eigenvalue| of the sampled loop."""
+    """Return the largest |eigenvalue| of the sampled loop, with sample time T and `delay`, s."""
     return float(np.abs(loop_eigenvalues(model, feedback, T, delay)).max())
 
 
@@ -138,8 +129,13 @@ def lowest_frequency(
     if any(not isinstance(record, JointPid | ModalVelocity) for record in controllers):
         locked *= 0.5
     elif pids and models and eigenvalue_count((models[0], gains := joint_gains(models[0], pids, T)), T, delay) <= MOST:
-        z = np.concatenate([_without_aliases(loop_eigenvalues(model, gains, T, delay), model, T) for model in models])
-        s = np.log(z[np.abs(z) > GONE]) / T
+        kept = []  # without vibrations of the robot above half the sampling frequency
+        for model in models:
+            s, z = np.linalg.eigvals(model.A), loop_eigenvalues(model, gains, T, delay)
+            aliases = np.exp(s[np.abs(s.imag) * T > np.pi] * T)
+            distance = np.abs(z[:, np.newaxis] - aliases).min(axis=1, initial=np.inf)
+            kept.append(z[(distance > ALIAS * np.abs(z)) & (np.abs(z) > GONE)])
+        s = np.log(np.concatenate(kept)) / T
         ringing = s[(s.imag > 0.0) & (-s.real < LIGHTLY * np.abs(s)) & (np.abs(s.imag) * T < np.pi * SAMPLED)]
         vibrating = ringing[np.abs(ringing) > RIGID * np.abs(s).max(initial=0.0)]
         locked = min(locked, float(vibrating.imag.min(initial=np.inf)) / (2 * np.pi))
@@ -153,23 +149,15 @@ def eigenvalue_count(loop: tuple[LinearModel, Feedback], T: float, delay: float)
     return len(model.A) + len(feedback.A) + int(np.ceil(longest / T)) * len(feedback.inputs)
 
 
-def _without_aliases(z: ComplexArray, model: LinearModel, T: float) -> ComplexArray:
-    """Those of the eigenvalues z of a loop that are no vibrations of the robot above half the sampling frequency."""
-    s = np.linalg.eigvals(model.A)
-    aliases = np.exp(s[np.abs(s.imag) * T > np.pi] * T)
-    distance = np.abs(z[:, np.newaxis] - aliases).min(axis=1, initial=np.inf)
-    return z[distance > ALIAS * np.abs(z)]
-
-
 def loop_eigenvalues(model: LinearModel, feedback: Feedback, T: float, delay: float) -> ComplexArray:
-    """Return eigenvalues of the sampled loop: plant, commands on their way, and controller states."""
+    """Return eigenvalues (n,) of the sampled loop (times in s): plant, commands on their way, controller states."""
     late = None if feedback.late is None else tuple(map(tuple, feedback.late))
     plant, y = _plant(model, feedback.inputs, feedback.outputs, late, T, delay)
     F = np.block([[plant.A + plant.B @ feedback.D @ y, plant.B @ feedback.C], [feedback.B @ y, feedback.A]])
     return np.asarray(np.linalg.eigvals(F), dtype=complex)
 
 
-@lru_cache(maxsize=PLANTS)
+@lru_cache(maxsize=16)  # gains are sought for the same plants, of several configurations in turn
 def _plant(
     model: LinearModel,
     inputs: tuple[str, ...],
@@ -214,7 +202,10 @@ def _readings(model: LinearModel, names: Sequence[str]) -> tuple[Array, Array]:
 
 
 def margins(loops: Loops, T: float, delay: float) -> Margins:
-    """Return the worst stability margins of a loop in several configurations."""
+    """Return the worst stability margins of a loop in several configurations, with sample time T and `delay`, s.
+
+    Gains are tried down to a hundredth and up to 10⁴ times, delays up to 50 samples.
+    """
 
     def radius(factor: float, more: float) -> float:
         return max(spectral_radius(model, of.times(factor), T, delay + more) for model, of in loops)
@@ -223,11 +214,11 @@ def margins(loops: Loops, T: float, delay: float) -> Margins:
     if max(eigenvalue_count(loop, T, delay) for loop in loops) > FEW:
         return Margins(now, np.nan, np.nan if now <= STABLE else 0.0)
     if now > STABLE:
-        factors = as_floats(np.geomspace(1.0, LEAST_GAIN, GRID))
+        factors = as_floats(np.geomspace(1.0, 1e-2, GRID))
         return Margins(now, _last_before(lambda c: radius(c, 0.0) <= STABLE, factors, missing=0.0), 0.0)
-    factors = as_floats(np.geomspace(1.0, LARGEST_GAIN, GRID))
+    factors = as_floats(np.geomspace(1.0, 1e4, GRID))
     gain = _last_before(lambda c: radius(c, 0.0) > STABLE, factors, missing=np.inf)
-    waits = np.append(0.0, T * np.geomspace(0.01, LONGEST_DELAY, GRID))
+    waits = np.append(0.0, T * np.geomspace(0.01, 50.0, GRID))
     return Margins(now, gain, _last_before(lambda d: radius(1.0, d) > STABLE, waits, missing=np.inf))
 
 
@@ -237,7 +228,7 @@ def _last_before(changed: Callable[[float], bool], values: Array, missing: float
     for value in map(float, values[1:]):
         if changed(value):
             after = value
-            while abs(after - before) > RELATIVE * max(abs(before), abs(after)):
+            while abs(after - before) > 1e-3 * max(abs(before), abs(after)):
                 middle = 0.5 * (before + after)
                 before, after = (before, middle) if changed(middle) else (middle, after)
             return 0.5 * (before + after)
@@ -249,7 +240,6 @@ FRACTION = 1 / 3  # of the lowest frequency with locked motors
 SAMPLES = 30  # a period of the bandwidth, at least
 SPARE = 2.0  # by which suggested gains may grow
 NARROW = 1.5  # gain margin below which a loop that is stable at some places of the path may well not be at others
-SMALLER, MOST_TIMES = 0.7, 20  # the bandwidth is made smaller by this factor, so often at most
 SAMPLE_TIMES = (1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)  # s
 LIGHT = 0.02  # of the inertia with rigid links: what a joint feels at once, below which its root has no inertia
 
@@ -272,9 +262,9 @@ class Suggestion:
 
 
 def joint_inertia(model: LinearModel) -> Array | None:
-    """Return (motors, motors) inertia, links and gears rigid, rotors included; None unless motors are coordinates.
+    """Return the inertia (motors, motors), kg·m² or kg, with links and gears rigid, rotors included.
 
-    With compliant gears, the motor's angle and the joint's move as one.
+    None unless motors are coordinates.
     """
     names = model.state_names[: model.freedom]
     motors = [model.input_names[k] for k in _motor_inputs(model)]
@@ -291,13 +281,13 @@ def suggested_gains(
     T: float,
     delay: float = 0.0,
     side: Literal["joint", "motor"] = "joint",
-    most_times: int = MOST_TIMES,
+    most_times: int = 20,
 ) -> Suggestion | None:
-    """PD gains for all motors to start with; None where none are found.
+    """Return PD gains for all motors to start with, for sample time T and `delay`, s; None where none are found.
 
     P = J ω² and D = 2 J ω, critical damping of the inertia J of each joint with rigid links and other joints locked,
-    the largest of the `models`. ω is a third of the lowest frequency with locked motors, with 30 samples a period at
-    least, and is made smaller until the sampled loops of all models stay stable with twice the gains, `most_times`.
+    the largest of the `models`. ω is a third of the lowest frequency with locked motors, with at least 30 samples a
+    period, and is reduced, `most_times`, until the sampled loops of all models are stable with twice the gains.
     """
     inertias = [joint_inertia(model) for model in models]
     known = [np.diag(inertia) for inertia in inertias if inertia is not None]
@@ -315,14 +305,14 @@ def suggested_gains(
         twice = joint_gains(models[0], [record], T).times(SPARE)
         if all(spectral_radius(model, g, T, delay) <= STABLE for model in models for g in (twice, twice.times(0.5))):
             return Suggestion(P, D, float(omega / (2 * np.pi)))
-        omega *= SMALLER
+        omega *= 0.7
     return None
 
 
 def unhurried_gains(models: Sequence[LinearModel]) -> tuple[Suggestion, float] | None:
-    """Gains for the whole third of the lowest frequency with locked motors, and the longest sample time (s) for them.
+    """Return gains for a third of the lowest frequency with locked motors, and the longest sample time (s) for them.
 
-    Of a 1-2-5 series from 10 ms down to 10 µs, without delay; None of a robot that does not bend, or without such one.
+    Of a 1-2-5 series from 10 ms down to 10 µs, without delay; None if the robot does not bend, or no gains are found.
     """
     lowest = min(locked_frequencies(model).min(initial=np.inf) for model in models)
     for T in SAMPLE_TIMES if np.isfinite(lowest) else ():
@@ -332,7 +322,7 @@ def unhurried_gains(models: Sequence[LinearModel]) -> tuple[Suggestion, float] |
 
 
 def light_roots(models: Sequence[LinearModel]) -> list[str]:
-    """Joints that feel hardly any inertia at once: a moment turns the root of a bending link, not the link.
+    """Return joints with hardly any inertia at once: a torque turns the root of a bending link, not the link.
 
     1/(c M⁻¹ b) of the whole model against the joint's inertia with rigid links.
     """
@@ -351,7 +341,7 @@ def light_roots(models: Sequence[LinearModel]) -> list[str]:
 
 
 def advice(loops: Loops, records: Sequence[JointPid], T: float, delay: float, found: Margins) -> list[str]:
-    """Why a loop is not stable, and gains to start with where `records` of joint PID controllers are all of it."""
+    """Explain why a loop is not stable; suggest gains if `records` of joint PID controllers are all controllers."""
     if np.isnan(found.gain):
         return [f"margins, and gains to start with, are not computed for a delay of {delay / T:.4g} samples"]
     models = [model for model, _ in loops]

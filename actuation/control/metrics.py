@@ -1,17 +1,16 @@
-"""How well a closed loop did: error of the tip, settling, overshoot, vibration, effort: see `DEFINITIONS`.
+"""Metrics of a closed loop: error of the tip, settling, overshoot, vibration, effort: see `DEFINITIONS`.
 
 Vibration is measured in the last period of the lowest frequency that the robot has with its joints controlled or
-locked. What is slower, a drift or an error that dies out, is the cubic of a least-squares fit of a cubic and one
+locked. Slower motion, a drift or an error that dies out, is the cubic of a least-squares fit of a cubic and one
 vibration to the last `PERIODS`: the cubic alone would take a part of the vibration for drift.
 
-These numbers are continuous in the motion: which steps an integrator takes, which round-off decides, must not show. So
-they are read at times that do not depend on the steps (`watched`), and no fit is chosen: all count, by what they leave.
+The metrics are continuous in the motion, so that they do not depend on the steps of an integrator, which round-off
+decides. They are read at times independent of the steps (`watched`), and all fits count, by what they leave.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
@@ -86,10 +85,10 @@ class LoopMotion:
 
 
 def ringing(time: Array, place: Array, lowest: float) -> tuple[float, float]:
-    """About which frequency (Hz) vibration is measured, and how long before the end of `time` (T,), s, in all.
+    """Return about which frequency (Hz) vibration is measured, and how long (s) before the end of `time` (T,), s.
 
-    `PERIODS` of the frequency `lowest`, Hz, within the time for which the `place` (T, d) of the tip rests, or in half
-    of the run where it does not rest. Where `LEAST_PERIODS`, or these, do not fit there, of the lowest that do.
+    `PERIODS` of the frequency `lowest`, Hz, within the time for which the `place` (T, d), m, of the tip rests, or in
+    half of the run where it does not rest. Where `LEAST_PERIODS`, or these, do not fit there, of the lowest that do.
     """
     whole = float(time[-1] - time[0])
     way = np.linalg.norm(place - place[-1], axis=1)
@@ -102,38 +101,29 @@ def ringing(time: Array, place: Array, lowest: float) -> tuple[float, float]:
 
 
 def resting(place_at: Callable[[Array], Array], time: Array) -> tuple[Array, Array]:
-    """Times (T,), s, after the paths of a run, and the place (T, d), m, of its tip there: for `ringing`."""
+    """Return even times (T,), s, over a run, and the place (T, d), m, of its tip there: for `ringing`."""
     even = np.linspace(time[0], time[-1], FINE + 1)
     return even, place_at(even)
 
 
 def watched(end: float, window: float, lowest: float) -> Array:
-    """Return times (2 `WATCHED` + 1,), s, in the `window` (s) before `end`; the last half in one period of `lowest`."""
+    """Return 2 `WATCHED` + 1 times, s, in the `window` (s) before `end`, half of them in one period of `lowest` Hz."""
     begin = end - (min(window, 1.0 / lowest) if lowest > 0.0 else window)
     before = np.linspace(end - window, begin, WATCHED, endpoint=False)
     return np.concatenate([before, np.linspace(begin, end, WATCHED + 1)])
 
 
 def vibration(time: Array, error: Array, window: float, lowest: float) -> float:
-    """Peak-to-peak vibration (m) of `error` (T, d), its slow part removed, in the last period of `lowest` (Hz).
+    """Return the peak-to-peak vibration (m) of `error` (T, d), m, in the last period of `lowest` (Hz).
 
-    That is found over the last `window` (s) of `time` (T,), which should have the times `watched`.
+    Its slow part over the last `window` (s) of `time` (T,), s, is removed; `time` should have the times `watched`. That
+    is the mean of the least-squares cubics with one vibration each near `lowest` and of the cubic alone, weighted by a
+    power of what each leaves, so that the best decides (G. L. Bretthorst, Bayesian Spectrum Analysis, 1988, ch. 2).
     """
     if not window > 0.0:
         return 0.0
     t = watched(float(time[-1]), window, lowest)
     values = _interpolated(t, time, error)
-    left = values - _slower(t, values, lowest)
-    last = left[t >= t[-WATCHED - 1]]
-    return float(np.sqrt(max(((last - one) ** 2).sum(axis=1).max() for one in last)))
-
-
-def _slower(t: Array, values: Array, lowest: float) -> Array:
-    """The cubic of (T, d) beside a vibration near `lowest` (Hz), (T, d).
-
-    The mean of the least-squares fits with one vibration each and of the cubic alone, weighted by a power of what each
-    leaves, so that the best decides: frequencies as in G. L. Bretthorst, Bayesian Spectrum Analysis, 1988, ch. 2.
-    """
     weights = np.sqrt(shares(t))[:, None]
     slow = np.vander(2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0, CUBIC + 1)
     phases = 2.0 * np.pi * lowest * NEARBY[:, None] * t if lowest > 0.0 else ()
@@ -143,39 +133,18 @@ def _slower(t: Array, values: Array, lowest: float) -> Array:
         cubics.append(slow @ parts[: CUBIC + 1])
         lefts.append(float(((weights * (values - shape @ parts)) ** 2).sum()))
     least = np.array([EXPLAINED * lefts[0], *lefts[1:]]) + np.finfo(float).eps * float(((weights * values) ** 2).sum())
-    if not least.any():
-        return np.zeros_like(values)
-    return np.average(cubics, axis=0, weights=(least.min() / least) ** PICKY)
+    if least.any():
+        values = values - np.average(cubics, axis=0, weights=(least.min() / least) ** PICKY)
+    last = values[t >= t[-WATCHED - 1]]
+    return float(np.sqrt(max(((last - one) ** 2).sum(axis=1).max() for one in last)))
 
 
 def overshoot(time: Array, place: Array, error: Array) -> float:
-    """Return how far (m) the tip, at `place` + `error` (T, d), passes its final position along the line to it."""
+    """Return how far (m) the tip, at `place` + `error` (T, d), m, passes its final position along the line to it."""
     way = place[-1] - place[0]
     length = float(np.linalg.norm(way))
     beyond = np.maximum((place + error - place[-1]) @ way, 0.0)
     return largest(time, beyond)[0] / length if length > 0.0 else 0.0
-
-
-def place_of_tip(
-    time: Array,
-    end: float,
-    known: tuple[Array, Array],
-    paths: Sequence[Mapping[str, Any]],
-    last: tuple[float, Array] | None = None,
-) -> Array:
-    """Return prescribed tip positions (T, d), m, from its `paths`, held before 0 and after `end` (s).
-
-    Else where it is in the inverse analysis, `known` as its times (K,) and positions (K, d). That may ring: from when
-    all paths are over, s, its place is the `last` one (d,), the final position.
-    """
-    place: Array = scipy.interpolate.CubicSpline(*known)(time)
-    on_path = np.clip(time, 0.0, end)
-    for components in paths:
-        for component, target in components.items():
-            place[:, "xyz".index(component)] = target.sample(on_path)[0]
-    if last is not None:
-        place[time >= last[0]] = last[1]
-    return place
 
 
 def _interpolated(times: Array, known: Array, values: Array) -> Array:
@@ -183,9 +152,9 @@ def _interpolated(times: Array, known: Array, values: Array) -> Array:
 
 
 def slow_part(t: Array, values: Array, window: float) -> Array:
-    """The part of (T, columns), evenly spaced, that is no vibration: cubics over a window (Savitzky and Golay 1964).
+    """Return the part of `values` (T, columns), at even times t (T,), that is no vibration.
 
-    By FFT: SciPy's filter takes a time that grows with the square of T.
+    Cubics over a `window` (s) (Savitzky and Golay 1964). By FFT: SciPy's filter takes a time that grows with T².
     """
     count = 2 * round(window / (2 * (t[1] - t[0]))) + 1 if len(t) > 1 else 1
     if not CUBIC < count <= len(t):
@@ -200,7 +169,7 @@ def slow_part(t: Array, values: Array, window: float) -> Array:
 
 
 def settling(t: Array, distance: Array) -> float:
-    """Return the time (s) from which `distance` (T,) stays below `SETTLED` of its largest value; NaN if never."""
+    """Return the time (s) from which `distance` (T,) at t (T,), s, stays below 5 % of its maximum; NaN if never."""
     largest_error = float(distance.max())
     return _last_crossing(t, distance, SETTLED * largest_error) if largest_error > 0.0 else 0.0
 
@@ -235,7 +204,7 @@ def last_change(values_at: Callable[[Array], Array], time: Array) -> float:
 def verdict_of(
     run: LoopMotion, cut: Array, asked: tuple[Array, Array], lowest: float, is_stable: bool | None, *, is_seen: bool
 ) -> str:
-    """Return the verdict on linear loop and run; `cut` (K, inputs) is 1 and −1 at limits, else 0.
+    """Return the verdict on linear loop and run; `cut` (K, inputs) is 1 and −1 where commands are at limits, else 0.
 
     "diverges"; "oscillates at its limits": in the last quarter, in which commands are at limits, vibration does not
     decay, or a command goes from one limit to the other; "grows": vibration, from quarter to quarter of a run without
@@ -250,7 +219,13 @@ def verdict_of(
     window = min(max(WINDOW * whole / len(cut), PERIODS / lowest if lowest > 0.0 else 0.0), whole / 4)
     still = even >= run.quiet
     parts = [part for part in (~still, still) if part.any()]  # the place of the tip may jump in between
-    shaking = np.concatenate([_shaking(even[part], error[part], window) for part in parts])
+    windows = [min(window, float(np.ptp(even[part])) / 4) for part in parts]
+    shaking = np.concatenate(
+        [
+            np.linalg.norm(error[part] - slow_part(even[part], error[part], of), axis=1)
+            for part, of in zip(parts, windows, strict=True)
+        ]
+    )
     off = np.linalg.norm(error - error[-1], axis=1)
     is_quiet = even[-1] - run.quiet >= RESTING * whole
     third, fourth = (shaking[even >= even[-1] - part * whole].max(initial=0.0) for part in (1 / 4, 1 / 8))
@@ -271,11 +246,6 @@ def verdict_of(
     moves, least = off[even >= even[-1] - tail].max(initial=0.0), np.linalg.norm(np.ptp(run.place_at(even), axis=0))
     is_settled = moves <= max(SETTLED * off.max(initial=0.0), NEGLIGIBLE * least / run.length, ROUND_OFF)
     return "stable" if is_settled or not is_quiet or not is_seen else "not settled"
-
-
-def _shaking(t: Array, error: Array, window: float) -> Array:
-    """Size (T,) of the vibration in `error` (T, d)."""
-    return np.linalg.norm(error - slow_part(t, error, min(window, float(np.ptp(t)) / 4)), axis=1)
 
 
 def _grows(shaking: Array, growth: float = GROWTH) -> bool:

@@ -1,10 +1,10 @@
-"""Observers: estimates of what no sensor reads, by a model of the robot about its reference, sampled as the loop is.
+"""Observers: estimates of what no sensor reads, by a sampled model of the robot about its reference.
 
     x̂ = x̂⁻ + L (y − C x̂⁻),    x̂⁻(k+1) = A x̂ + B u + M (y − C x̂⁻)
 
 with y and u off the reference. A Kalman filter has M = 0 and, in its steady state, L = P Cᵀ (C P Cᵀ + R)⁻¹ with P from
-a Riccati equation (Anderson and Moore, Optimal Filtering, 1979, ch. 4); a published predictor has L = 0. Commands on
-their way, and the filters of sensors, are states of the model; the first are known.
+a Riccati equation (Anderson and Moore, Optimal Filtering, 1979, ch. 4); a predictor has L = 0. Commands on their way,
+which are known, and the filters of sensors are states of the model.
 """
 
 from __future__ import annotations
@@ -22,13 +22,18 @@ from ...common.structs import struct
 from ...mbs.model.gears import with_compliance
 from ..context import ActuatedContext
 from .controllers import Controller, LinearFeedback, make_controllers
-from .linear_model import LinearModel, kept_modes, observability, state_space
+from .linear_model import LinearModel, kept_modes, observability, riccati, sampled, state_space, zero_order_hold
 from .margins import Feedback
-from .observer_records import FilterRecord, GainsObserver, KalmanObserver, KalmanRecord, ScheduledObserver
-from .records import SampledAnalysis
+from .records import (
+    FilterRecord,
+    GainsObserver,
+    KalmanObserver,
+    KalmanRecord,
+    SampledAnalysis,
+    ScheduledObserver,
+    Sensor,
+)
 from .robot import ControlledRobot, Setup, default_tip, estimated_sensors
-from .sampling import riccati, sampled, zero_order_hold
-from .sensor_records import Sensor
 from .signals import Signal, filters, make_signals, merged, readings_at
 
 FAR = 1e9  # times the largest reading off its reference: such estimates diverge
@@ -39,7 +44,7 @@ NAMED = 0.1  # of the largest entry of a vector of states
 
 @struct
 class Observer:
-    """An observer with n states of a loop with p readings; see the module."""
+    """Matrices of an observer with n states for a loop with p readings; SI units; see the module."""
 
     A: Array  # (n, n)
     B: Array  # (n, inputs)
@@ -61,15 +66,15 @@ class Observer:
         return float(np.abs(np.linalg.eigvals(self.error)).max(initial=0.0))
 
     def towards(self, other: Observer, part: float) -> Observer:
-        """All matrices that part of the way to those of another observer."""
+        """Return the observer with all matrices interpolated: `part` 0 is this one, 1 the other."""
         names = [each.name for each in fields(self) if each.name != "estimates"]
         mixed = {name: (1 - part) * getattr(self, name) + part * getattr(other, name) for name in names}
         return replace(self, **mixed)
 
     def closed(self, inner: Feedback) -> Feedback:
-        """Controllers that act on readings and estimates, with the observer: from readings to commands.
+        """Return controllers on readings and estimates, with the observer, as a law from readings to commands.
 
-        Limits of commands do not act.
+        Limits of commands are left out.
         """
         p, c = len(self.C), len(inner.A)
         unit, none = np.eye(p), np.zeros((p, len(self.A)))
@@ -89,10 +94,10 @@ def kalman(
     estimated: Sequence[str],
     sampling: tuple[Sequence[str], float, float],
 ) -> Observer:
-    """The steady-state filter of a model that has what is read and estimated among its outputs.
+    """Return the steady-state filter of a model with the signals read, and those `estimated`, among its outputs.
 
     `sampling`: the names of commands, the sample time and the delay (s). Raises `InputError` for sensors without noise,
-    for noise that acts on no input of the model, and where something that does not die out cannot be seen.
+    for noise that acts on no input of the model, and for motions that do not decay and that no sensor sees.
     """
     inputs, T, delay = sampling
     names = [signal.name for signal in read]
@@ -162,9 +167,9 @@ def _covariance(A: Array, C: Array, Q: Array, R: Array, states: Sequence[str]) -
 
 
 def hidden(A: Array, C: Array, names: Sequence[str]) -> list[str]:
-    """States of x(k+1) = A x in motions that do not die out and that C x does not show (Popov–Belevitch–Hautus).
+    """Return names of states of x(k+1) = A x in motions that do not decay and that C x does not show.
 
-    States are scaled first, as their units are arbitrary.
+    The test of Popov, Belevitch and Hautus, with states scaled first, as their units are arbitrary.
     """
     found: dict[str, None] = {}
     A, (scale, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
@@ -181,7 +186,7 @@ def hidden(A: Array, C: Array, names: Sequence[str]) -> list[str]:
 
 
 def given(record: GainsObserver, setup: Setup) -> Observer:
-    """The observer of matrices that the scene has. Raises `InputError` where they do not fit, or let errors grow."""
+    """Return the observer of the scene's matrices. Raises `InputError` where they do not fit, or let errors grow."""
     A, B, C, gain = (np.atleast_2d(np.array(of, dtype=float)) for of in record.matrices)
     n, m, p = len(A), len(record.inputs), len(record.outputs)
     for name, of, size in (("A", A, (n, n)), ("B", B, (n, m)), ("C", C, (p, n)), ("gain", gain, (n, p))):
@@ -242,18 +247,18 @@ class Estimates:
     values: Array  # (K, names)
     tip: str
     position: Array  # (K, d) m, estimated of the tip
-    error: Array  # (K,) m, distance from where it was
+    error: Array  # (K,) m, distance from the true position
     sigma: Array  # (K, d) m, standard deviations by the covariance of the filter
-    nees: float  # mean of eᵀ Σ⁻¹ e over the number of axes: 1 where errors are as the filter takes them to be
-    inside: float  # part of the errors within ±2σ, 0.95 likewise
+    nees: float  # mean of eᵀ Σ⁻¹ e over the number of axes, 1 if the covariance is right
+    inside: float  # part of the errors within ±2σ, 0.95 if the covariance is right
     poles: ComplexArray  # of the estimate's error, from sample to sample, at the start
 
 
 class Observed:
-    """Controllers that act on readings and estimates: what the loop asks in their place.
+    """Controllers with an observer, which the loop calls in their place.
 
     `setup` is theirs, with estimates behind the readings; `origin`: readings (K, p) and commands (K, inputs) that the
-    model is about; `ranges` (2, inputs) cut what it gets.
+    model is about; `ranges` (2, inputs): limits of the commands that the observer knows.
     """
 
     def __init__(
@@ -264,9 +269,9 @@ class Observed:
         *,
         ranges: Array,
         origin: tuple[Array, Array],
-        settle: int = 0,
-        tip: str = "",
-        warnings: Sequence[str] = (),
+        settle: int,
+        tip: str,
+        warnings: Sequence[str],
     ) -> None:
         self.schedule, self.setup, self.controllers = schedule, setup, controllers
         self._range, self._settle, self.tip = ranges, settle, tip
@@ -302,13 +307,13 @@ class Observed:
         return u
 
     def __copy__(self) -> Observed:
-        """As at the start of a run."""
+        """Make a copy with controllers as at the start of a run."""
         found = object.__new__(Observed)
         vars(found).update(vars(self), controllers=[copy(each) for each in self.controllers])
         return found
 
     def record(self, truth: Mapping[str, Array]) -> Estimates:
-        """Return the estimates at the samples taken, compared with the `truth` (taken,) by name."""
+        """Return the estimates at the samples taken, compared with the true values (taken,) by name."""
         p, tip = self._p, self.tip
         taken = len(next(iter(truth.values())))
         first = self.schedule.observers[0]
@@ -345,9 +350,9 @@ class Observed:
 
 
 def model_of_filter(record: FilterRecord, robot: ControlledRobot, row: int, signals: Sequence[Signal]) -> LinearModel:
-    """Return the linear model of a filter about output `row` of the robot's motion; the readings `signals` are outputs.
+    """Return the linear model of a filter about output `row` of the robot's motion; `signals` are outputs.
 
-    Its links have their lowest modes alone, and its inputs are also the forces that `record` names.
+    Its links have their lowest modes alone; forces that `record` names are inputs, too.
     """
     mechanism, voltages = kept_modes(*robot.linear(row, record.points), record.modes)
     return state_space(mechanism, voltages, readings_at(with_compliance(robot.model), mechanism, signals))
@@ -360,7 +365,7 @@ def kalman_filters(
     sensors: Sequence[Sensor],
     more: Sequence[Sensor],
 ) -> tuple[Schedule, list[str]]:
-    """The filters at instants of the path that estimate `more`, and in words the modes that `sensors` cannot see there.
+    """Return filters at instants of the path that estimate `more`, and warnings of modes that `sensors` cannot see.
 
     Raises `InputError` as `kalman` does.
     """
@@ -383,10 +388,10 @@ def kalman_filters(
 def make_observed(
     analysis: SampledAnalysis, context: ActuatedContext, setup: Setup, reference: Array, ranges: Array, nominal: Array
 ) -> Observed:
-    """The observer with the controllers that act on its estimates.
+    """Make the observer with the controllers that act on its estimates.
 
-    `reference` (K, estimates) as of `Setup`, `ranges` and `nominal` as of `Observed`. Raises `InputError` where the
-    observer does not fit the robot.
+    `reference` (K, estimates) as in `Setup`, `ranges` (2, inputs) as in `Observed`, `nominal` (K, inputs): commands of
+    the reference; SI units. Raises `InputError` where the observer does not fit the robot.
     """
     record, robot = analysis.observer, setup.robot
     tip, origin = analysis.tip or default_tip(robot.model), setup.reference
@@ -420,12 +425,5 @@ def make_observed(
         P[inner.places(*own), inner.columns(*(f"estimate/disturbance/{name}" for name in own))] = 1.0
         acting.append(LinearFeedback(inner, P))
     return Observed(
-        schedule,
-        inner,
-        acting,
-        ranges=ranges,
-        origin=(origin, nominal),
-        settle=record.settle,
-        tip=tip,
-        warnings=unseen,
+        schedule, inner, acting, ranges=ranges, origin=(origin, nominal), settle=record.settle, tip=tip, warnings=unseen
     )

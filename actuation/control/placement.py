@@ -1,62 +1,67 @@
-"""The search for the centers of patches on a link that do most: by what they reach, or by the voltages a path takes."""
+"""The analysis `kind = "placement"`: the centers of patches on a link that do most.
+
+By what patches reach, by the voltages a path takes, or by what they tell of the tip. Mass and stiffness of patches,
+where the scene adds them to the link, stay where the scene has the patches.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from itertools import combinations_with_replacement
 from math import ceil, comb
 from pathlib import Path
+from typing import Annotated, Literal, Self
 
 import numpy as np
+from pydantic import Field, model_validator
 
 from ...common.arrays import Array, Indices
-from ...common.errors import InputError
+from ...common.errors import InputError, quoted
 from ...common.libraries import scipy
 from ...common.structs import struct
-from ...mbs.run.record import Details
+from ...common.validation import Record
+from ...mbs.analysis.operating_points import InstantAnalysis, find_operating_points, of_earlier, row_at
+from ...mbs.fields.field_types import ModeCount, Name, PatchCount, PointReference, Positive, Reference, under
+from ...mbs.linear.linearisation import LinearEquations
+from ...mbs.model.gears import with_compliance
+from ...mbs.model.motors import motor_forces
+from ...mbs.run.record import Details, Run
+from ...mbs.run.replay import supplied_in
+from ...mbs.scene.analysis import Surroundings
+from ..context import ActuatedContext
+from ..patches.link_patches import LinkPatches, link_patches
 from ..patches.patches import PatchArray
 from ..patches.records import PztLayout
-from .linear_model import LinearModel
-from .placement_records import Placement
+from .linear_model import LinearModel, state_space
+from .observer import kalman, model_of_filter
+from .records import FilterRecord, Sensor, check_sampling
+from .robot import default_tip, whole_robot
+from .signals import Signal, make_signals
 
 SHARE = 0.1  # of a mode's strain energy in the link, for the mode to be its business
 CHUNK = 200  # sets whose voltages over the path are held in memory together
 SEED = 0  # of the evolution: the same scene gives the same patches
-STEPS = 2  # candidates per length of a patch, where the scene gives no spacing
 
 
 @struct
 class PatchableLink:
-    """A link that is to get patches, by the m coordinates p that these reach."""
+    """A link to place patches on, by the m coordinates p that these reach."""
 
-    # name, length: of the link, m
     name: str
-    length: float
+    length: float  # m
     bodies: tuple[str, ...]  # whose modal coordinates are those of the link in linear models: itself, or its pieces
     layout: PztLayout  # of the patches
-    stiffness: Array  # (m,) of p, and `served` how many of p, the first ones, patches are to serve
-    served: int
+    stiffness: Array  # (m,) of p, rad²/s²
+    served: int  # number of p, the first ones, that patches are to serve
     own: Array  # (m, n) p from the modal coordinates of the `bodies`, side by side, as linear models have them
-    # elsewhere, by the keys "count" or "centers"; `InputError` where they do not fit the link
+    # patches by the keys "count" or "centers"; `InputError` where they do not fit the link
     patches: Callable[..., PatchArray]
 
 
 @struct
-class Candidates:
-    """Places (k,) m for the center of one patch, `gap` of which two patches lie apart at least, and Φ_V there.
-
-    Phi_V (n, k) modal forces per volt, zero columns where the section has a step; `capacitance` (k,) as sensors, F.
-    """
-
-    centers: Array
-    gap: int
-    Phi_V: Array
-    capacitance: Array
-
-
-@struct
 class Evaluation:
-    """A set of patches: centers (count,) m, reach (modes,) and the value of the criterion, to be as large as can be."""
+    """A set of patches: centers (count,) m, reach (modes,) and the value of the criterion, which is maximized."""
 
     centers: Array
     reach: Array
@@ -71,26 +76,20 @@ class Placed(Details):
     # best, even: the patches found, and as many spread evenly
     best: Evaluation
     even: Evaluation
-    frequency: Array  # (modes,) Hz of the modes that count, and `share` (modes,) of their strain energy in the link
-    share: Array
+    frequency: Array  # (modes,) Hz, of the modes that count
+    share: Array  # (modes,) of their strain energy, in the link
     largest_voltage: Array  # (2,) V of best and even over the path; nan without one
-    candidates: Array  # (k,) m centers that were allowed, and `candidate_reach` (modes, k) of a single patch there
-    candidate_reach: Array
+    candidates: Array  # (k,) m, centers that were allowed
+    candidate_reach: Array  # (modes, k) of a single patch there
     sets: int  # how many sets of patches were compared
     method: str  # "all sets" or "evolution"
 
 
-@struct
-class ModalReach:
-    """Modes to be reached: frequency (modes,) Hz, shape (modes, n) of the link in them, its share (modes,) in them."""
+def locked_modes(model: LinearModel, link: PatchableLink, count: int) -> tuple[Array, Array, Array]:
+    """Return the lowest `count` modes of the robot, motors locked, in which the link bends.
 
-    frequency: Array
-    shape: Array
-    share: Array
-
-
-def locked_modes(model: LinearModel, link: PatchableLink, count: int) -> ModalReach:
-    """The lowest modes of the robot with its motors locked in which the link bends."""
+    Frequencies (modes,), Hz, shapes (modes, m) on p, and the share (modes,) of the strain energy in the link.
+    """
     f = model.freedom
     modal = [i for i, name in enumerate(model.state_names[:f]) if name.startswith("modal/")]
     own = [k for body in link.bodies for k, i in enumerate(modal) if model.state_names[i].startswith(f"modal/{body}/")]
@@ -101,15 +100,7 @@ def locked_modes(model: LinearModel, link: PatchableLink, count: int) -> ModalRe
     energy = np.einsum("im,i,im->m", of_link, link.stiffness, of_link)
     share = energy / np.einsum("im,ij,jm->m", shape, (K + K.T) / 2, shape)
     chosen = np.flatnonzero((share > SHARE) & (squares > 0.0))[:count]
-    return ModalReach(np.sqrt(squares[chosen]) / (2 * np.pi), of_link[:, chosen].T, share[chosen])
-
-
-def link_modes(link: PatchableLink, count: int) -> ModalReach:
-    """The lowest `count` modes of the link itself, which the voltages of a path must reach."""
-    chosen = np.argsort(link.stiffness)[:count]
-    return ModalReach(
-        np.sqrt(link.stiffness[chosen]) / (2 * np.pi), np.eye(len(link.stiffness))[chosen], np.ones(len(chosen))
-    )
+    return np.sqrt(squares[chosen]) / (2 * np.pi), of_link[:, chosen].T, share[chosen]
 
 
 def place(
@@ -120,13 +111,13 @@ def place(
     F_p: Array | None,
     deviation: Callable[[Array], float] | None = None,
 ) -> Placed:
-    """Find the best centers for the patches of a link; `model` for controllability, F_p (T, m) for voltages.
+    """Find the best centers for the patches of a link.
 
-    `deviation`: of the estimated tip, m, with sensors that read (m, count) V of each unit of p.
-
-    Controllability of a mode is what its gramian grows with under light damping, Σ (φᵀ b_k)² over the patches, b_k the
-    modal forces of a patch per volt (Gawronski, Advanced Structural Dynamics, 2004, ch. 4), relative to what the
-    best single patch gives the mode: frequencies and damping drop out. Raises `InputError` where there is no room.
+    By a `model` for controllability, modal forces F_p (T, m), N/√kg, for voltages, or the `deviation` (m) of the
+    estimated tip with patches that read (m, count) V per unit of p. Controllability of a mode is Σ (φᵀ b_k)² over the
+    patches, b_k the modal forces of a patch per volt, to which its gramian is proportional under light damping
+    (Gawronski, Advanced Structural Dynamics, 2004, ch. 4), relative to that of the best single patch: frequencies and
+    damping drop out. Raises `InputError` where there is no room.
     """
     key = f"{scene_path}: placement"
     count = wanted.count or link.layout.patch_count
@@ -138,42 +129,47 @@ def place(
     if modes > link.served or (F_p is not None and modes > count):
         most = link.served if F_p is None else min(count, link.served)
         raise InputError(f"{key}.modes: expected at most {most}", modes)
-    candidates = _candidates(scene_path, wanted, link, count)
-    reach = locked_modes(model, link, modes) if model is not None else link_modes(link, modes)
+    centers, gap, Phi_V, C = _candidates(scene_path, wanted, link, count)
+    if model is not None:
+        frequency, shape, share = locked_modes(model, link, modes)
+    else:  # the voltages of a path must reach those of the link itself
+        lowest = np.argsort(link.stiffness)[:modes]
+        frequency, shape = np.sqrt(link.stiffness[lowest]) / (2 * np.pi), np.eye(len(link.stiffness))[lowest]
+        share = np.ones(len(lowest))
     even = link.patches(count=count, centers=None)
-    largest = np.square(reach.shape @ candidates.Phi_V).max(axis=1)
+    largest = np.square(shape @ Phi_V).max(axis=1)
     if not np.all(largest > 0.0):
         raise InputError(f'{key}: expected modes that patches on "{link.name}" can reach', "some they cannot")
 
     def gain(Phi_V: Array) -> Array:
-        return np.asarray(np.square(reach.shape @ Phi_V) / largest[:, None])
+        return np.asarray(np.square(shape @ Phi_V) / largest[:, None])
 
     def judge(Phi_V: Array, capacitance: Array) -> Array:
-        """Values (sets,) of sets of patches, Phi_V (n, sets, count) and capacitances (sets, count)."""
+        """Values (sets,) of sets of patches, Phi_V (m, sets, count) and capacitances (sets, count)."""
         if deviation is not None:  # by reciprocity the charge of a deflection p is Φ_Vᵀ p
             return -np.array([deviation(volts) for volts in (Phi_V / capacitance).swapaxes(0, 1)])
         if F_p is not None:
-            return -_voltages(reach.shape, Phi_V, F_p)
+            return -_voltages(shape, Phi_V, F_p)
         return _measured(wanted.measure, gain(Phi_V.reshape(len(Phi_V), -1)).reshape(-1, *Phi_V.shape[1:]).sum(axis=2))
 
-    Phi_V, C = candidates.Phi_V, candidates.capacitance
-    indices, sets, method = _search(candidates, count, wanted.most_sets, lambda i: judge(Phi_V[:, i], C[i]))
+    room = len(centers) - (count - 1) * gap
+    indices, sets, method = _search(room, gap * np.arange(count), wanted.most_sets, lambda i: judge(Phi_V[:, i], C[i]))
     found = [
-        (candidates.centers[indices], Phi_V[:, indices], C[indices]),
+        (centers[indices], Phi_V[:, indices], C[indices]),
         (even.edges.mean(axis=1), even.Phi_V, even.read_capacitance),
     ]
     rated = [Evaluation(x, gain(P).sum(axis=1), float(judge(P[:, None], of[None])[0])) for x, P, of in found]
-    voltages = [np.nan if F_p is None else float(_voltages(reach.shape, P[:, None], F_p)[0]) for _, P, _ in found]
+    voltages = [np.nan if F_p is None else float(_voltages(shape, P[:, None], F_p)[0]) for _, P, _ in found]
     best = 0 if rated[0].value >= rated[1].value else 1  # even spacing need not be on the grid
     return Placed(
         wanted=wanted,
         best=rated[best],
         even=rated[1],
-        frequency=reach.frequency,
-        share=reach.share,
+        frequency=frequency,
+        share=share,
         largest_voltage=np.array([voltages[best], voltages[1]]),
-        candidates=candidates.centers,
-        candidate_reach=gain(candidates.Phi_V),
+        candidates=centers,
+        candidate_reach=gain(Phi_V),
         sets=sets,
         method=method,
     )
@@ -201,15 +197,13 @@ def _voltages(shape: Array, Phi_V: Array, F_p: Array) -> Array:
     return np.concatenate(largest)
 
 
-def _search(
-    candidates: Candidates, count: int, most_sets: int, judge: Callable[[Indices], Array]
-) -> tuple[Indices, int, str]:
-    """The best set of candidates (count,), how many were compared and how.
+def _search(room: int, offset: Indices, most_sets: int, judge: Callable[[Indices], Array]) -> tuple[Indices, int, str]:
+    """The best set of candidates (count,), the number of sets compared, and the method.
 
-    y_1 ≤ y_2 ≤ … are the candidates less the room that the patches before them take: every such set is free of overlap.
+    Of y_1 ≤ y_2 ≤ … below `room`, the candidates less the `offset` (count,) of the patches before them: every such set
+    is free of overlap.
     """
-    room = len(candidates.centers) - (count - 1) * candidates.gap
-    offset = candidates.gap * np.arange(count)
+    count = len(offset)
     if comb(room + count - 1, count) <= most_sets:
         sets = np.array(list(combinations_with_replacement(range(room), count)), dtype=np.intp) + offset
         return sets[int(np.argmax(judge(sets)))], len(sets), "all sets"
@@ -233,9 +227,12 @@ def _search(
     return decoded(result.x), compared, "evolution"
 
 
-def _candidates(scene_path: Path, wanted: Placement, link: PatchableLink, count: int) -> Candidates:
+def _candidates(
+    scene_path: Path, wanted: Placement, link: PatchableLink, count: int
+) -> tuple[Array, int, Array, Array]:
+    """Places (k,), m, for the center of a patch, how many two patches lie apart, Φ_V (m, k), capacitances (k,), F."""
     length = link.layout.length
-    spacing = wanted.spacing or length / STEPS
+    spacing = wanted.spacing or length / 2
     steps = int((link.length - length) / spacing * (1 + 1e-9))
     gap = ceil(length / spacing * (1 - 1e-9))
     if steps < 0 or steps + 1 <= (count - 1) * gap:
@@ -252,4 +249,214 @@ def _candidates(scene_path: Path, wanted: Placement, link: PatchableLink, count:
         except InputError:  # across a step of the section: such a patch does nothing
             continue
         columns[:, k], capacitance[k] = patch.Phi_V[:, 0], patch.read_capacitance[0]
-    return Candidates(centers, gap, columns, capacitance)
+    return centers, gap, columns, capacitance
+
+
+class EstimateRecord(FilterRecord):
+    """The Kalman filter whose estimate of the tip placed patches serve, as sensors."""
+
+    sample_time: Positive
+    """Time between readings, s."""
+    noise: Positive
+    """Standard deviation of the noise of each patch, V."""
+    sensor: tuple[Sensor, ...] = ()
+    """Other sensors, such as encoders, with their noise."""
+    tip: PointReference | None = None
+    """Point "BODY.POINT" to be estimated; by default the tip of the robot."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        check_sampling(self.sensor, self.sample_time, "sample_time", at_every_sample=True)
+        return self
+
+    def references(self) -> Iterator[Reference]:
+        """Yield references to what is measured, pushed and estimated."""
+        for k, sensor in enumerate(self.sensor, 1):
+            yield from under(f"sensor no. {k}", sensor.references())
+        yield from super().references()
+        if self.tip is not None:
+            yield Reference("tip", self.tip)
+
+
+class Placement(Record):
+    """Optimal positions of the `count` patches of a [[pzt]] on its link.
+
+    Modes are the lowest of the robot with locked motors; with criterion "voltage", those of the link, whose forces in
+    the inverse analysis `about` count. With "estimate" patches are sensors.
+    """
+
+    body: str
+    """Link with patches."""
+    pzt: Name | None = None
+    """Layout of the patches; required if a link has several layouts."""
+    count: PatchCount | None = None
+    """Number of patches; by default that of its [[pzt]]."""
+    criterion: Literal["controllability", "voltage", "estimate"] = "controllability"
+    """Controllability of the robot's lowest modes, the largest voltage over its limit along the path, or the deviation
+    of the estimated tip (the root of the trace of its covariance).
+    """
+    estimate: EstimateRecord | None = None
+    """Filter of criterion "estimate"."""
+    measure: Literal["worst", "mean", "product"] = "worst"
+    """Controllability measure: that of the worst mode, their mean, or their product."""
+    modes: ModeCount | None = None
+    """Number of the lowest modes that count."""
+    spacing: Positive | None = None
+    """Distance between tried centers, m; by default half the length of a patch."""
+    most_sets: Annotated[int, Field(gt=0, le=10_000_000)] = 100_000
+    """Largest number of sets for an exhaustive search; beyond it, differential evolution searches."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if (self.criterion == "estimate") != (self.estimate is not None):
+            found = "none" if self.estimate is None else f'it with "{self.criterion}"'
+            raise ValueError(f'expected the table "estimate" with criterion = "estimate" only, found {found}')
+        return self
+
+    def references(self) -> Iterator[Reference]:
+        """Yield references to the link and its patches."""
+        yield Reference("placement.body", self.body)
+        yield Reference("placement.body", self.body, "patched body")
+        if self.pzt is not None:
+            yield Reference("placement.pzt", self.pzt, "patches")
+        if self.estimate is not None:
+            yield from under("placement.estimate", self.estimate.references())
+
+
+class PatchPlacement(InstantAnalysis):
+    """Optimal positions of patches; `placement` has the criterion."""
+
+    kind: Literal["placement"]
+    placement: Placement
+    """Patches and criterion."""
+
+    @property
+    def is_over_path(self) -> bool:
+        """Whether the voltages of a whole motion count, not the robot at one instant."""
+        return self.placement.criterion == "voltage"
+
+    @property
+    def needs_times(self) -> bool:
+        """Unless the whole motion counts."""
+        return not self.is_over_path
+
+    def references(self) -> Iterator[Reference]:
+        """Yield references to the link and its patches."""
+        yield from self.placement.references()
+
+    def problems(self, among: Surroundings) -> Iterator[str]:
+        """Check that the analysis placed for has the modal forces or the model that the criterion needs."""
+        if not self.is_over_path:
+            if self.instants is not None and len(self.instants) != 1:
+                yield f"times: expected one time to place patches for, found {len(self.instants)}"
+        else:
+            source = next((other for other in among.earlier if other.name == self.source), None)
+            if source is None or "joints+pzt" not in source.applicable:
+                found = "none" if source is None else f'"{source.name}" of kind "{source.kind}"'
+                yield (
+                    f"about: expected an earlier analysis of kind {among.replayable('joints+pzt')} for"
+                    f' placement.criterion = "voltage", found {found}'
+                )
+        yield from super().problems(among)
+
+    def run(self, context: ActuatedContext) -> Run:
+        """Solve for the operating points, and place the patches by them; the details of the run are `Placed`.
+
+        Other layouts of the link stay where they are. Raises `InputError` unless the layout is known and has room.
+        """
+        model, wanted = context.model, self.placement
+        link = _link(context, wanted)
+        if self.is_over_path:
+            assert self.source is not None
+            source = context.outcomes[self.source]
+            run = of_earlier(source, self).at([row_at(model.scene.path, self, source, t) for t in self.times])
+            of_link = _patches(context, wanted.body)
+            modal = motor_forces(source.model, source.q, supplied_in(source)).modal
+            F_p = of_link.modes[link.layout.label].forces(of_link.on_link(modal))
+            return replace(run, details=place(model.scene.path, wanted, link, None, F_p))
+        run, about = find_operating_points(context, self)
+        at = LinearEquations(about.model, about.q[0]).at(float(about.time[0]), about.q[0], about.v[0], about.a[0])
+        deviation = None if wanted.estimate is None else _deviation(context, wanted.estimate, link, run)
+        return replace(run, details=place(model.scene.path, wanted, link, state_space(at, {}), None, deviation))
+
+
+def _deviation(
+    context: ActuatedContext, record: EstimateRecord, link: PatchableLink, run: Run
+) -> Callable[[Array], float]:
+    """The standard deviation (m) of the tip's estimate by patches that read (m, count) V per unit of p.
+
+    The filter is that of a closed loop about `run`, and has whole links. Raises `InputError` where there is none.
+    """
+    key, robot = f"{context.model.scene.path}: placement.estimate", whole_robot(context, run)
+    tip = Sensor(point=record.tip or default_tip(robot.model))
+    plant = with_compliance(robot.model)
+    read, wanted = (make_signals(plant, context, of) for of in (record.sensor, (tip,)))
+    known = model_of_filter(record, robot, 0, [*read, *wanted])
+    to_file = robot.model.tree.nodes[robot.model.tree.index[link.name]].body.modal_transform
+    own = _patches(context, link.name).modes[link.layout.label].coordinates(to_file.T).T
+    columns = [k for k, name in enumerate(known.state_names) if name.startswith(f"modal/{link.name}/")]
+    own = own[:, : len(columns)]  # the lowest modes are kept
+    as_sensor = Sensor(pzt=link.layout.label, noise=record.noise)
+
+    def deviation(volts: Array) -> float:
+        patches = [Signal(f"patch/{k}", as_sensor) for k in range(volts.shape[1])]
+        C = np.zeros((len(patches), len(known.A)))
+        C[:, columns] = volts.T @ own
+        model = replace(
+            known, C=np.vstack([known.C, C]), D=np.vstack([known.D, np.zeros((len(C), known.D.shape[1]))]),
+            output_names=(*known.output_names, *(patch.name for patch in patches)),
+        )  # fmt: skip
+        try:
+            found = kalman(record, model, [*read, *patches], [s.name for s in wanted], ((), record.sample_time, 0.0))
+        except InputError as error:
+            raise InputError(f"{key}: {error}") from None
+        of_tip = found.E[: len(wanted)]
+        return float(np.sqrt(np.trace(of_tip @ found.covariance @ of_tip.T)))
+
+    return deviation
+
+
+def _link(context: ActuatedContext, wanted: Placement) -> PatchableLink:
+    """The link by the coordinates that the layout reaches; patches elsewhere must reach the same."""
+    name = wanted.body
+    path, of_link, body = context.model.scene.path, _patches(context, name), context.links[name]
+    whole = context.whole
+    bodies: tuple[str, ...] = (name,)
+    tree = (context.model if whole is None else whole.model).tree
+    to_file = tree.nodes[tree.index[name]].body.modal_transform
+    if whole is not None and name in whole.divided:
+        bodies, to_file = whole.divided[name].bodies, to_file @ whole.divided[name].gathered
+    label = wanted.pzt or ("" if len(of_link.arrays) > 1 else next(iter(of_link.arrays)))
+    if label not in of_link.arrays:
+        found = f'"{label}"' if label else "none"
+        raise InputError(
+            f'{path}: placement.pzt: expected one of the layouts {quoted(of_link.arrays)} of "{name}"', found
+        )
+    reached, layout = of_link.modes[label], of_link.arrays[label].layout
+
+    def patches(**changes: object) -> PatchArray:
+        one = layout.with_one_limit(**({"mode_weights": None, "point_weights": None} | changes))
+        found = link_patches(path, [one], body, context.carrying[name])
+        if not np.array_equal(found.modes[label].rows, reached.rows):
+            raise InputError(f'{path}: placement.body: expected patches that excite the modes of "{label}"')
+        return found.arrays[label]
+
+    own = reached.coordinates(to_file.T).T
+    return PatchableLink(
+        name=name,
+        length=body.length,
+        bodies=bodies,
+        layout=layout,
+        stiffness=reached.stiffness,
+        served=reached.served,
+        own=own,
+        patches=patches,
+    )
+
+
+def _patches(context: ActuatedContext, link: str) -> LinkPatches:
+    """Those of a link, also where its pieces carry them, on all modes of its file."""
+    of_link = context.patches[link]
+    layouts = [array.layout for array in of_link.arrays.values()]
+    placed = link_patches(context.model.scene.path, layouts, context.links[link], context.carrying[link])
+    return replace(placed, bodies=of_link.bodies)

@@ -1,17 +1,19 @@
-"""Controllers and closed loops of a scene file, key by key. SI units."""
+"""Sensors, observers, controllers and closed loops of a scene file, key by key. SI units."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
 
 from ...common.deferred import ReadBy
+from ...common.errors import quoted
 from ...common.keys import MOST_OUTPUTS
 from ...common.python_files import check_python_file
-from ...common.validation import existing_file
+from ...common.validation import InputFile, Record, existing_file
 from ...mbs._core import TimeFunction
 from ...mbs.fields.field_types import (
     ModeCount,
@@ -22,12 +24,210 @@ from ...mbs.fields.field_types import (
     Positive,
     Reference,
     Referring,
+    one_of,
     under,
 )
 from ...mbs.scene.analysis import ActuatedAnalysis, Analysis, Need
 from ...mbs.scene.loads import Load
-from .observer_records import GainsObserver, KalmanObserver, KalmanRecord, Matrix, Observer
-from .sensor_records import Sensor, check_sampling
+
+
+class Sensor(Referring):
+    """A sensor of a joint coordinate, of a point, of the strain at a point, or of patch voltages.
+
+    Accelerations are in global axes; "accelerometer" is r̈ − g and "gyro" the angular velocity, in the axes of the
+    section. Patches read the charge Φ_Vᵀ p over `capacitance`; none with a `shunt`.
+
+    A reading is filtered by `high_pass`, gets `bias` and Gaussian noise, is cut at ±`range` and rounded to
+    `resolution`, kept for `sample_time`, and known `delay` later.
+    """
+
+    joint: str | None = None
+    """Measured joint coordinate, rad (prismatic: m)."""
+    motor: str | None = None
+    """Joint with stiffness: measured motor angle after the gear, rad."""
+    point: PointReference | None = None
+    """Point "BODY.POINT" with measured x, y (in 3D z), m, global axes."""
+    pzt: str | None = None
+    """Layout of patches with measured voltages, V: its name, or that of its body."""
+    modal: str | None = None
+    """Body with directly read modal coordinates (m·√kg); no real sensor can."""
+    strain: PointReference | None = None
+    """Point "BODY.POINT" among the `stress` points of a link, with measured strain along the link."""
+    measure: Literal["value", "rate", "acceleration", "accelerometer", "gyro"] = "value"
+    """Measured quantity: value or rate; of points also acceleration, accelerometer (m/s²) or gyro (rad/s)."""
+    resolution: NotNegative = 0.0
+    """Resolution: readings are multiples of it, in their unit; 0: continuous."""
+    noise: NotNegative = 0.0
+    """Standard deviation of Gaussian noise, in the unit of the reading."""
+    noise_density: NotNegative = 0.0
+    """Density of white noise, unit of the reading per √Hz (one-sided), up to half the sampling frequency."""
+    bias: float = 0.0
+    """Constant error of the reading, in its unit."""
+    range: Positive | None = None
+    """Largest reading of either sign, in its unit."""
+    high_pass: Positive | None = None
+    """Corner frequency of a first-order high-pass filter, as of charge amplifiers, Hz."""
+    delay: NotNegative = 0.0
+    """Age of readings, a multiple of the sample time of the loop, s."""
+    sample_time: Positive | None = None
+    """Time between readings, a multiple of the sample time of the loop, s; by default that."""
+    capacitance: Positive | None = None
+    """Capacitance of each patch, F; by default computed."""
+
+    refers_to = (
+        ("point", "body"), ("modal", "body"), ("modal", "flexible body"), ("pzt", "patches"), ("joint", "joint"),
+        ("motor", "elastic joint"),
+    )  # fmt: skip
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Sensor:
+        subject = one_of(self, ("joint", "motor", "point", "pzt", "modal", "strain"))
+        every = ("value", "rate", "acceleration", "accelerometer", "gyro")
+        known = {"pzt": every[:1], "strain": every[:1], "point": every}.get(subject, every[:2])
+        if self.measure not in known:
+            raise ValueError(f'expected one of {quoted(known)} as measure with "{subject}", found "{self.measure}"')
+        if self.capacitance is not None and subject != "pzt":
+            raise ValueError(f'expected the key "capacitance" only with "pzt", found it with "{subject}"')
+        return self
+
+    def deviation(self, T: float) -> float:
+        """Standard deviation of the noise of readings every T (s), in their unit."""
+        return float(np.hypot(self.noise, self.noise_density / np.sqrt(2 * T)))
+
+    def references(self) -> Iterator[Reference]:
+        """Yield references to what is measured; points of strain belong to the link file."""
+        yield from super().references()
+        if self.strain is not None:
+            link = self.strain.partition(".")[0]
+            yield from (Reference("strain", link), Reference("strain", link, "flexible body"))
+
+
+def check_sampling(sensors: Sequence[Sensor], T: float, whose: str, *, at_every_sample: bool) -> None:
+    """Raise `ValueError` for delays and sample times that are no multiples of T (s), or longer if `at_every_sample`."""
+    for k, sensor in enumerate(sensors, 1):
+        for key in ("delay", "sample_time"):
+            samples = (getattr(sensor, key) or 0.0) / T
+            if abs(samples - round(samples)) > 1e-6 or (key == "sample_time" and 0.0 < samples < 0.5):
+                raise ValueError(
+                    f"expected a multiple of {whose} ({T:g} s) as {key} of sensor no. {k}, found"
+                    f" {getattr(sensor, key):g} s"
+                )
+            if round(samples) > 1 and key == "sample_time" and at_every_sample:
+                raise ValueError(f"expected sensors that read at every sample, found no. {k} slower")
+
+
+Matrix = tuple[tuple[float, ...], ...]
+
+
+class ObserverRecord(Record):
+    """Base of all observers."""
+
+    settle: Annotated[int, Field(ge=0, le=1_000_000)] = 0
+    """Samples for which observer and controllers see the first readings before the run; 0: start on the reference."""
+    about: Literal["reference", "zero"] = "reference"
+    """Origin of commands, readings and estimates: what they are on the reference, or zero."""
+
+
+class FilterRecord(Record):
+    """Keys of the model of Kalman filters.
+
+    They estimate coordinates and rates of joints, motors and the lowest `modes` of links, and constant loads on
+    request. `process` and `disturbance` name inputs of the linear model: "joint/NAME", "pzt/LAYOUT/k" or
+    "force/BODY.POINT/x".
+    """
+
+    modes: ModeCount = 2
+    """Number of the lowest modes per link in the model."""
+    process: dict[str, Positive] = Field(min_length=1)
+    """Standard deviation, by input, of white noise that is constant over a sample; N·m, V or N."""
+    disturbance: dict[str, Positive] = Field(default_factory=dict)
+    """Constant loads to be estimated, by input, with their drift; N·m, V or N per √s."""
+
+    @property
+    def points(self) -> dict[str, str]:
+        """Points "BODY.POINT" at which forces are inputs, each by its own name."""
+        return {reference.name: reference.name for reference in FilterRecord.references(self)}
+
+    def references(self) -> Iterator[Reference]:
+        """Yield references to points at which forces are inputs."""
+        for key in ("process", "disturbance"):
+            for name in getattr(self, key):
+                kind, _, rest = name.partition("/")
+                point = rest.rpartition("/")[0]
+                if kind == "force" and "." in point:
+                    yield Reference(key, point)
+
+
+class KalmanRecord(ObserverRecord, FilterRecord):
+    """Keys of Kalman filters of a loop."""
+
+    reject: bool = False
+    """Permission for motors and patches to act against estimated disturbances of theirs."""
+
+
+class KalmanObserver(KalmanRecord):
+    """Steady-state Kalman filter of the sampled linear model about the reference at `time`."""
+
+    kind: Literal["kalman"]
+    time: NotNegative = 0.0
+    """Instant of the reference about which the model is linear, s."""
+
+
+class ScheduledObserver(KalmanRecord):
+    """Kalman filters at `count` instants of the path; between them all matrices are straight lines.
+
+    Each is checked to be stable, half way between as well.
+    """
+
+    kind: Literal["scheduled"]
+    count: Annotated[int, Field(ge=2, le=1000)] = 5
+    """Number of instants, from start to end of the reference."""
+
+
+class GainsObserver(ObserverRecord):
+    """x̂⁺ = A x̂ + B u + gain (y − C x̂) with given numbers, for the controller "state-feedback".
+
+    States are "state/1", …; y is in units of the readings times `scale`.
+    """
+
+    kind: Literal["gains"]
+    inputs: tuple[str, ...]
+    """Commands u, as `control/` in the results names them."""
+    outputs: Annotated[tuple[str, ...], NotEmpty]
+    """Readings y, as `control/` in the results names them."""
+    A: Matrix | None = None
+    """(states, states), from sample to sample."""
+    B: Matrix | None = None
+    """(states, inputs)."""
+    C: Matrix | None = None
+    """(outputs, states)."""
+    gain: Matrix | None = None
+    """(states, outputs)."""
+    file: InputFile | None = None
+    """File .npz or .mat with A, B, C and gain."""
+    scale: tuple[float, ...] | None = None
+    """Factor of each reading, such as 1000 for y in mm; by default 1."""
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        missing = [name for name in ("A", "B", "C", "gain") if getattr(self, name) is None]
+        if (self.file is None) == bool(missing):
+            found = "both" if not missing else f"neither ({quoted(missing)} missing)"
+            raise ValueError(f"expected A, B, C and gain, or a file with them, found {found}")
+        return self
+
+    @property
+    def matrices(self) -> tuple[Any, Any, Any, Any]:
+        """A, B, C and gain. Raises `InputError` where the file does not have them."""
+        if self.file is None:
+            return self.A, self.B, self.C, self.gain
+        from .linear_model import read_arrays
+
+        A, B, C, gain = read_arrays(self.file, ("A", "B", "C", "gain"))
+        return A, B, C, gain
+
+
+Observer = Annotated[KalmanObserver | ScheduledObserver | GainsObserver, Field(discriminator="kind")]
 
 
 class ControllerRecord(Referring):

@@ -29,21 +29,20 @@ from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches
 from ..patches.patches import voltage_gain
 from .linear import voltages_at
-from .records import Controller, JointPid, Lqr, ModalVelocity, PythonController
-from .sensor_records import Sensor
+from .records import Controller, JointPid, Lqr, ModalVelocity, PythonController, Sensor
 from .signals import check_joint, volts_on_file
 
 
 def rigid_freedom(model: Model) -> int:
-    """Return the number of independent joint coordinates of the rigid mechanism in its initial posture."""
+    """Return the degrees of freedom of the mechanism with rigid links in its initial posture, with those of gears."""
     return mobility(model, undeformed_posture(model).q).freedom + len(model.tree.gears)
 
 
 class RigidArm:
-    """τ(γ, γ̇, γ̈) of all motors with rigid links, by the core, rotors and friction too, without loads.
+    """Torques τ(γ, γ̇, γ̈) of all motors with rigid links, by the core, rotors and friction too, without loads.
 
-    The motors' moments are the multipliers of γ = γ(t), affine in γ̈: one evaluation with γ̈ = 0, one for each motor.
-    `q` (n_q,) of the tree of `model` is where its `angles` are. Raises `InputError` where the motors do not fit.
+    They are the multipliers of γ = γ(t), affine in γ̈: one evaluation with γ̈ = 0, one for each motor. `q` (n_q,): the
+    first configuration of `model`. Raises `InputError` where the motors do not fit.
     """
 
     def __init__(self, model: Model, q: Array) -> None:
@@ -74,7 +73,7 @@ class RigidArm:
         return self._model.constraints.values(self._q[None], np.zeros(1))[0][0, self._motors]
 
     def place(self, gamma: Array) -> tuple[Array, Array]:
-        """Coordinates q (n_q,) and C_v at motor angles gamma, from the last place.
+        """Move to motor angles `gamma` (motors,), rad or m, from the last place; return coordinates q (n_q,) and C_v.
 
         Raises `SolveError` where the links do not reach these angles.
         """
@@ -91,7 +90,7 @@ class RigidArm:
         return self._q, self._model.constraints.values(q, now)[1][0]
 
     def terms(self, gamma: Array, gamma_dot: Array) -> tuple[Array, Array]:
-        """M (motors, motors) and h (motors,) of τ = M γ̈ + h."""
+        """Return M (motors, motors) and h (motors,) of τ = M γ̈ + h, SI units, by γ and γ̇ (motors,)."""
         q, C_v = self.place(gamma)
         rates = np.zeros(len(C_v))
         rates[self._motors] = gamma_dot
@@ -108,7 +107,7 @@ class RigidArm:
         return np.column_stack([moments(unit) - h for unit in np.eye(len(C_v))[self._motors]]), h
 
     def moments(self, gamma: Array, gamma_dot: Array, gamma_ddot: Array) -> Array:
-        """τ (motors,) N·m, or N."""
+        """Return τ (motors,), N·m or N, for angles, rates and accelerations (motors,) of motors; SI units."""
         M, h = self.terms(gamma, gamma_dot)
         return M @ gamma_ddot + h
 
@@ -124,23 +123,14 @@ def _rigid(body: Body) -> Body:
 
 
 @struct
-class FlexibleLink:
-    """A flexible link: `mass` (kg), `length` (m), and the `stiffness` ω² (n,) (rad²/s²) of its modal coordinates p."""
-
-    mass: float
-    length: float
-    stiffness: Array
-
-
-@struct
 class PatchSignals:
     """The k patches of one link, and the m coordinates of it that they are to serve, the lowest first."""
 
-    inputs: tuple[str, ...]  # names of their voltages, which are those of their readings
-    layouts: tuple[str, ...]  # names that sensors know them by
+    inputs: tuple[str, ...]  # names of their voltages and of their readings
+    layouts: tuple[str, ...]  # names in sensors
     omega: Array  # (m,) rad/s of these coordinates
-    gain: Array  # (k, m) volts per force on each of these coordinates
-    volts: Array  # (k, m) that the patches read per unit of each
+    gain: Array  # (k, m) V√kg/N, voltages per force on each of these coordinates
+    volts: Array  # (k, m) V/(m·√kg), readings per unit of each
     own: Array  # (m, n) these coordinates from all modal coordinates p of the link
 
 
@@ -156,11 +146,6 @@ class ControlledRobot:
     def path(self) -> Path:
         """Path of the scene file."""
         return self.model.scene.path
-
-    @property
-    def motor_joints(self) -> tuple[str, ...]:
-        """Names of joints with motors, in the order of commands."""
-        return tuple(self.model.motors)
 
     @property
     def motors(self) -> tuple[str, ...]:
@@ -183,32 +168,34 @@ class ControlledRobot:
         return len(self.motors) == rigid_freedom(self.model)
 
     @cached_property
-    def links(self) -> Mapping[str, FlexibleLink]:
-        """Flexible links of the model, by name."""
-        bodies = [node.body for node in self.model.tree.nodes if node.body.n_modes]
-        return {body.name: FlexibleLink(body.mass, body.length or 1.0, body.stiffness) for body in bodies}
+    def links(self) -> Mapping[str, Body]:
+        """Equations of the flexible links, by name."""
+        return {node.body.name: node.body for node in self.model.tree.nodes if node.body.n_modes}
 
     @cached_property
     def patches(self) -> Mapping[str, PatchSignals]:
         """Patches by link, with the modes that its layouts reach together."""
-        return {name: self._patched(name, of_link) for name, of_link in self.of_links.items()}
-
-    def _patched(self, name: str, of_link: LinkPatches) -> PatchSignals:
-        reached, to_file = of_link.reached, self.model.tree.nodes[self.model.tree.index[name]].body.modal_transform
-        inputs = [f"pzt/{layout}/{k}" for layout, of in of_link.arrays.items() for k in range(1, len(of.edges) + 1)]
-        volts = np.vstack([volts_on_file(of_link, layout)[name] for layout in of_link.arrays])
-        own = reached.coordinates(to_file.T).T
-        return PatchSignals(
-            tuple(inputs), tuple(of_link.arrays), np.sqrt(reached.stiffness[: reached.served]),
-            voltage_gain(of_link.reach), reached.seen(volts), own,
-        )  # fmt: skip
+        signals = {}
+        for name, of_link in self.of_links.items():
+            counts, reached = {layout: len(of.edges) for layout, of in of_link.arrays.items()}, of_link.reached
+            volts = [volts_on_file(of_link, layout)[name] for layout in counts]
+            to_file = self.model.tree.nodes[self.model.tree.index[name]].body.modal_transform
+            signals[name] = PatchSignals(
+                inputs=tuple(f"pzt/{layout}/{k}" for layout, count in counts.items() for k in range(1, count + 1)),
+                layouts=tuple(counts),
+                omega=np.sqrt(reached.stiffness[: reached.served]),
+                gain=voltage_gain(of_link.reach),
+                volts=reached.seen(np.vstack(volts)),
+                own=reached.coordinates(to_file.T).T,
+            )
+        return signals
 
     def linear(
         self, row: int, points: Mapping[str, str] = MappingProxyType({})
     ) -> tuple[LinearMechanism, Mapping[str, Array]]:
-        """Linearize about output `row` of the motion: the mechanism, and forces of 1 V along s by voltage name.
+        """Linearize about output `row` of the motion, with `points` as in `LinearEquations`.
 
-        `points` as in `LinearEquations`.
+        Returns the mechanism, and generalized forces (f,) of 1 V along s by voltage name, N·m/V or their like.
         """
         plant = with_compliance(self.model)
         moved = with_motor_coordinates(self.source, plant)
@@ -217,7 +204,7 @@ class ControlledRobot:
         return found, voltages_at(plant, found, self.of_links)
 
     def rigid(self) -> RigidArm:
-        """Return the robot with rigid links. Raises `InputError` if the motors do not fit the mechanism."""
+        """Return the robot with rigid links at the start. Raises `InputError` if motors do not fit the mechanism."""
         return RigidArm(self.model, self.source.q[0])
 
 
@@ -229,18 +216,21 @@ def whole_robot(context: ActuatedContext, source: Run) -> ControlledRobot:
 
 
 def input_names(robot: ControlledRobot) -> tuple[str, ...]:
-    """Names of all commands: motor moments "joint/NAME", then voltages "pzt/LAYOUT/k"."""
+    """Return names of all commands: motor torques "joint/NAME", then voltages "pzt/LAYOUT/k"."""
     voltages = [name for link in robot.patches.values() for name in link.inputs]
     return tuple([f"joint/{name}" for name in robot.motors] + voltages)
 
 
 def estimate(volts: Array, count: int) -> Array:
-    """Return (count, k) estimates of coordinates from patch readings; `volts` (k, m) are readings per coordinate."""
+    """Return the matrix (count, k), m·√kg/V, from patch readings to estimates of coordinates, by `volts` (k, m).
+
+    `volts`: readings per unit of each coordinate.
+    """
     return as_floats(np.linalg.pinv(volts[:, : min(volts.shape)])[:count])
 
 
 def needed_sensors(robot: ControlledRobot, controllers: Sequence[Controller]) -> Iterator[Sensor]:
-    """Sensors that the `controllers` of an analysis need; ideal ones where the scene has none."""
+    """Yield the ideal sensors that the `controllers` of an analysis need where the scene has none."""
     for record in controllers:
         if isinstance(record, JointPid):
             for joint in record.joints:
@@ -248,7 +238,7 @@ def needed_sensors(robot: ControlledRobot, controllers: Sequence[Controller]) ->
                 if joint in record.derivative and record.rate == "measured":
                     yield Sensor.model_validate({record.side: joint, "measure": "rate"})
         elif not isinstance(record, PythonController | ModalVelocity):
-            for joint in robot.motor_joints:
+            for joint in robot.model.motors:
                 yield Sensor(joint=joint)
                 yield Sensor(joint=joint, measure="rate")
         if isinstance(record, Lqr):
@@ -267,7 +257,7 @@ def needed_sensors(robot: ControlledRobot, controllers: Sequence[Controller]) ->
 
 
 def estimated_sensors(robot: ControlledRobot, controllers: Sequence[Controller], tip: str) -> Iterator[Sensor]:
-    """Ideal sensors of all that an observer estimates: the tip, coordinates, rates, and the controllers' readings."""
+    """Yield ideal sensors of all that an observer estimates: the tip, coordinates, rates, the controllers' readings."""
     model = robot.model
     subjects = [{"joint": one.name} for one in model.scene.joint if one.units and one.name in model.tree.carried]
     subjects += [{"motor": name} for name in robot.elastic_joints] + [{"modal": name} for name in robot.links]
@@ -279,7 +269,7 @@ def estimated_sensors(robot: ControlledRobot, controllers: Sequence[Controller],
 
 
 def default_tip(model: Model) -> str:
-    """The tool of the scene, or the tip of the last link."""
+    """Return the tool point "BODY.POINT" of the scene, or the tip of the last link."""
     if (tool := model.scene.tool_point) is not None:
         return tool
     body = next(node.body for node in reversed(model.tree.nodes) if node.body.points)
@@ -293,7 +283,7 @@ class Setup:
     robot: ControlledRobot
     model: Model  # its equations of motion
     patches: Mapping[str, LinkPatches]  # by body
-    # inputs, outputs: names of commands (moments N·m, voltages V) and readings, as `signals` names them
+    # inputs, outputs: names of commands (torques N·m or N, voltages V) and readings, as `signals` names them
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     times: Array  # (K,) of the samples, s
@@ -304,7 +294,7 @@ class Setup:
     source: Run  # of the inverse analysis
 
     def robot_coordinates(self, joints: Iterable[str]) -> Iterator[tuple[str, str]]:
-        """Joints with the names of their coordinates, one after the other."""
+        """Yield joints with the names of their coordinates, one after the other."""
         for joint in joints:
             yield from ((joint, name) for name in self.robot.coordinates(joint))
 
@@ -314,12 +304,12 @@ class Setup:
         return any(name.startswith("estimate/") for name in self.outputs)
 
     def columns(self, *names: str) -> Indices:
-        """Return indices of readings in y, or of their estimates. Raises `InputError` for unknown ones."""
+        """Return indices (names,) of readings in y, or of their estimates. Raises `InputError` for unknown ones."""
         of = [f"estimate/{name}" if self.has_estimates and name not in self.outputs else name for name in names]
         return self._indices(of, self.outputs, "readings")
 
     def places(self, *names: str) -> Indices:
-        """Return indices of commands in u. Raises `InputError` for a joint without motor."""
+        """Return indices (names,) of commands in u. Raises `InputError` for a joint without motor."""
         return self._indices(names, self.inputs, "commands")
 
     def _indices(self, names: Sequence[str], among: Sequence[str], of: str) -> Indices:
@@ -328,9 +318,9 @@ class Setup:
         return np.array([among.index(name) for name in names], dtype=int)
 
     def patch_places(self, body: str) -> Indices:
-        """Return indices in u of the voltages of a body's patches."""
+        """Return indices (k,) in u of the voltages of a body's patches."""
         return self.places(*self.robot.patches[body].inputs)
 
     def modal_columns(self, body: str, m: int, ending: str = "/rate") -> Indices:
-        """The readings of the lowest m modal coordinates of a body, or of their rates."""
+        """Return indices (m,) in y of the lowest m modal coordinates of a body, or of their rates."""
         return self.columns(*(f"modal/{body}/{k}{ending}" for k in range(1, m + 1)))

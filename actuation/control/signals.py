@@ -1,4 +1,4 @@
-"""Readings of sensors by name, as linear models name them: joints, motors, points, patches, modes."""
+"""Readings of sensors by name, as in linear models: joints, motors, points, patches, modes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import field
 
 import numpy as np
 
-from ...common.arrays import Array, Indices, as_floats
+from ...common.arrays import Array, as_floats
 from ...common.errors import InputError, check_known, quoted
 from ...common.structs import struct
 from ...mbs.linear.linearisation import LinearMechanism, labelled
@@ -16,12 +16,11 @@ from ...mbs.model.known_motion import KnownStates, motion_forces
 from ...mbs.model.model import Model
 from ...mbs.model.nodes import Section
 from ...mbs.model.system import MultibodySystem
-from ...mbs.model.tree import KinematicTree
 from ...mbs.run.context import WholeLinks, place_of
 from ...mbs.scene.space import SPACES
 from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches, OnBody
-from .sensor_records import Sensor
+from .records import Sensor
 
 ORDERS = {"value": 0, "rate": 1, "acceleration": 2, "accelerometer": 3, "gyro": 4}
 STEP = 2.0**-13  # of differences of readings of points, in rad, m, √kg·m and these per s
@@ -32,7 +31,7 @@ class Signal:
     """One reading: the coordinate `axis` (0, 1, 2) of a `point`, or `along` (n_v,) times joint and modal coordinates.
 
     `name`: "joint/NAME", "motor/NAME", "point/BODY.POINT/x" or y or z, "strain/BODY.POINT", "pzt/LAYOUT/k",
-    "modal/BODY/k" (k from 1), with "/rate", … behind it where that is what is measured.
+    "modal/BODY/k" (k from 1), followed by "/rate", … where that is measured.
     """
 
     name: str
@@ -48,7 +47,7 @@ class Signal:
 
 
 class Sensing:
-    """Readings of signals in states of a tree."""
+    """Readings of signals in the states of a model."""
 
     def __init__(self, model: Model, read: Sequence[Signal]) -> None:
         tree = model.tree
@@ -56,7 +55,12 @@ class Sensing:
         self._linear = np.array([k for k, signal in enumerate(read) if not signal.point], dtype=int)
         self._order = np.array([read[k].order for k in self._linear], dtype=int)
         self._along = np.reshape([read[k].along for k in self._linear], (len(self._linear), tree.n_v))
-        self._where = _places_in_q(tree)
+        # (n_v,) where in q the coordinate of each rate is; of orientations, which nothing reads so, some other place
+        self._where = np.zeros(tree.n_v, dtype=np.intp)
+        for node in tree.nodes:
+            if node.joint.q_count == node.joint.freedoms:
+                self._where[node.v] = np.arange(node.q.start, node.q.stop)
+            self._where[node.p_v] = np.arange(node.p_q.start, node.p_q.stop)
         sections = {signal.point: tree.section(signal.point) for signal in read if signal.point}
         self._points: list[tuple[str, Section, int, list[int], list[int]]] = []  # by order: where in readings, axes
         for point, order in dict.fromkeys((s.point, s.order) for s in read if s.point):
@@ -69,7 +73,7 @@ class Sensing:
         self._system = MultibodySystem(model, drives) if accelerated else None
 
     def read(self, q: Array, v: Array, a: Array) -> Array:
-        """Readings (T, signals) of q (T, n_q), v and a (T, n_v)."""
+        """Return readings (T, signals), SI units, in states q (T, n_q), v and a (T, n_v)."""
         found = np.zeros((len(q), self._count))
         values = q[:, self._where] @ self._along.T, v @ self._along.T
         found[:, self._linear] = np.where(self._order == ORDERS["value"], *values)
@@ -88,7 +92,7 @@ class Sensing:
         return found
 
     def rows(self, about: LinearMechanism) -> tuple[Array, Array, Array]:
-        """Return derivatives (signals, f) of readings by s, ṡ and s̈, for a linear mechanism of the same tree.
+        """Return derivatives (signals, f) of readings by s, ṡ and s̈, SI units, for a linear mechanism of the same tree.
 
         Exact of coordinates; of points by differences, to 1e-11. While loops move, the change of their ∂q/∂s counts
         once, not its rate.
@@ -119,20 +123,10 @@ def readings_at(
     return dict(zip([signal.name for signal in read], rows, strict=True))
 
 
-def _places_in_q(tree: KinematicTree) -> Indices:
-    """(n_v,) where in q the coordinate of each rate is; of orientations, which nothing reads so, some other place."""
-    places = np.zeros(tree.n_v, dtype=np.intp)
-    for node in tree.nodes:
-        if node.joint.q_count == node.joint.freedoms:
-            places[node.v] = np.arange(node.q.start, node.q.stop)
-        places[node.p_v] = np.arange(node.p_q.start, node.p_q.stop)
-    return places
-
-
 def make_signals(
     model: Model, context: ActuatedContext, sensors: Iterable[Sensor], whole: WholeLinks | None = None
 ) -> list[Signal]:
-    """The readings of sensors of the scene, of whose links some are in pieces where there are `whole` ones.
+    """Return the readings of sensors of the scene; `whole`: the links that are in pieces in the model.
 
     Raises `InputError` for a joint without coordinates in the tree, and for strain where the link has no such point.
     """
@@ -174,9 +168,9 @@ def _of_sensor(model: Model, context: ActuatedContext, sensor: Sensor, whole: Wh
 
 
 def filters(read: Sequence[Signal], T: float) -> tuple[Array, Array, Array, Array]:
-    """Discrete A (m, m), B, C, D (p, p) of step T, s, from true values to p readings: high-pass filters, then delays.
+    """Return discrete A (m, m), B, C, D (p, p) of step T, s, from true values to p readings.
 
-    A high-pass filter is exact for what changes as a straight line between samples.
+    High-pass filters, exact for values that change linearly between samples, then delays.
     """
     p = len(read)
     A, B, C, D = np.zeros((0, 0)), np.zeros((0, p)), np.zeros((p, 0)), np.eye(p)
@@ -209,7 +203,7 @@ class Filter:
         self._w: Array | None = None
 
     def __call__(self, y: Array) -> Array:
-        """Readings (signals,) of what sensors are exposed to."""
+        """Return readings (signals,) for their true values y (signals,) at the next sample."""
         A, B, C, D = self._matrices
         if not len(A):
             return y
@@ -237,12 +231,12 @@ def _modal_coordinates(model: Model, link: str, whole: WholeLinks | None) -> Arr
 
 
 def volts_on_file(of_link: LinkPatches, layout: str, capacitance: float | None = None) -> dict[str, Array]:
-    """Return, by body, (k, n) patch readings (V) per unit of the modes of the body's file.
+    """Return patch readings (k, n), V/(m·√kg), per unit of the modes of the file of each body.
 
-    A patch reads its charge over its capacitance. By reciprocity the charge of a deflection is the modal force of a
-    voltage, Φ_Vᵀ p (Lee and Moon, J. Appl. Mech. 57, 1990). A patch that also drives the link is read through a bridge,
-    which leaves this voltage (Dosch, Inman and Garcia, J. Intell. Mater. Syst. Struct. 3, 1992). Without charge a
-    patch bends the link back, as far as modes lack these strains: `OnBody.yielding`.
+    A patch reads its charge over its `capacitance`, F. By reciprocity the charge of a deflection is the modal force of
+    a voltage, Φ_Vᵀ p (Lee and Moon, J. Appl. Mech. 57, 1990). A patch that also drives the link is read through a
+    bridge, which leaves this voltage (Dosch, Inman and Garcia, J. Intell. Mater. Syst. Struct. 3, 1992). With open
+    electrodes patches bend the link back, by strains that modes lack: `OnBody.yielding`.
     """
     own, columns, bodies = of_link.arrays[layout].layout, of_link.columns(layout), of_link.bodies
     pieces = [name for name in bodies if name != of_link.body]

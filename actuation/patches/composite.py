@@ -1,4 +1,4 @@
-"""Patches as layers of their link: the composite section with its modes, and what a volt on each does to these.
+"""Patches as layers of their link: the composite section with its modes, what a volt does, what patches add.
 
 Under the strains e = (φ_z', u', φ_x', −φ_y') of the axis and a voltage V the layers at one place take the loads
 
@@ -22,26 +22,31 @@ face stretch the link, too, and those off the middle of the width bend it about 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array, Indices, as_floats
 from ...common.errors import InputError
+from ...common.keys import SMALLEST
+from ...common.rotations import skew
+from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
+from ...mbs.model.body import Body, BodyPoint
+from ...mbs.model.masses import with_line_masses
 from ...mbs.quantities.stress import SectionLoads
 from .records import PztLayout
 from .sections import (
     STRETCH,
     TWIST,
-    LayerLoads,
     LinkSections,
     across_row,
     bending_row,
     felt_rows,
     layer_loads,
+    layer_section,
     link_sections,
-    load_per_volt,
     own_row,
     potentials,
     side,
@@ -71,8 +76,8 @@ class GaussPoint(NamedTuple):
 def composite(placed: Sequence[PlacedLayout], body: ModalBody) -> tuple[Array, Array, Array]:
     """Return the mutual effects of the k patches of all layouts and their link, over n modes of the modal body.
 
-    The stiffness (n, n) that patches add, and the modal forces per volt (k, n) that the layers' own stiffness takes of
-    those on a link held straight; R is 0 where rigidities are not known. Last `LayersOnLink.yielding`.
+    The stiffness (n, n), rad²/s², that patches add; modal forces per volt (k, n), N/(√kg·V), that the layers' own
+    stiffness takes of those on a link held straight; `LayersOnLink.yielding`. R is 0 where rigidities are not known.
     """
     layers = layers_on_link(placed, body)
     stiffness, per_volt = layers.B.T @ layers.by_modes, layers.by_volts.T @ layers.B
@@ -80,7 +85,10 @@ def composite(placed: Sequence[PlacedLayout], body: ModalBody) -> tuple[Array, A
 
 
 def section_loads(placed: PlacedLayout, body: ModalBody, p: Array, voltages: Array) -> SectionLoads:
-    """P over a motion, per length of the link, of patches that bend in the plane: p (T, n), file's; voltages (T, k)."""
+    """Return P per length of the link over a motion, N and N/m, of patches that bend in the plane.
+
+    By p (T, n) on the modes of the body's file, m·√kg, and voltages (T, k), V.
+    """
     layers = layers_on_link([placed], body)
     P = voltages @ layers.by_volts.T - p @ layers.by_modes.T
     count = len(layers.points)
@@ -107,12 +115,18 @@ class LayersOnLink(NamedTuple):
 
 
 def layers_on_link(placed: Sequence[PlacedLayout], body: ModalBody) -> LayersOnLink:
-    """Return what the layers of all layouts do on their link."""
+    """Return the effects of the layers of all layouts on their link."""
     sections = link_sections(body)
     intervals, covering = _intervals(placed)
     points = list(gauss_points(body, intervals))
     strains = _strains(body, np.array([at.x for at in points]))
-    felt = _felt([layout for layout, _ in placed], strains)
+    is_felt = np.zeros(4, dtype=bool)
+    for layout, _ in placed:
+        rows, across = felt_rows(layout), across_row(layout)
+        if not layout.offset and not strains[:, across].any():  # no mode has this curvature
+            rows = rows[rows != across]
+        is_felt[rows] = True
+    felt = np.flatnonzero(is_felt)
     B = strains[:, felt].reshape(-1, body.mode_count)
     patches = sum(len(edges) for _, edges in placed)
     C, f = np.zeros((len(B), len(B))), np.zeros((len(B), patches))
@@ -121,9 +135,9 @@ def layers_on_link(placed: Sequence[PlacedLayout], body: ModalBody) -> LayersOnL
         block = slice(len(felt) * i, len(felt) * (i + 1))
         exact[block] = 1.0 / (at.weight * sections.rigidity[at.station, felt])
         for layout, patch in covering[at.interval]:
-            loads = felt_loads(layout, sections, at.station)
-            C[block, block] += at.weight * loads.C[np.ix_(felt, felt)]
-            f[block, patch] = at.weight * loads.f[felt]
+            of_strain, of_volt = felt_loads(layout, sections, at.station)
+            C[block, block] += at.weight * of_strain[np.ix_(felt, felt)]
+            f[block, patch] = at.weight * of_volt[felt]
             straight[block, patch] = at.weight * straight_loads(layout, *place_of(layout, sections, at.station))[felt]
     R = _residual(exact, B @ np.linalg.solve(body.stiffness, B.T))
     held = np.linalg.solve(np.eye(len(B)) + C @ R, np.concatenate([C @ B, f], axis=1))
@@ -131,22 +145,11 @@ def layers_on_link(placed: Sequence[PlacedLayout], body: ModalBody) -> LayersOnL
     return LayersOnLink(points, B, held[:, : B.shape[1]], by_volts, straight, (f * (R @ by_volts)).sum(axis=0))
 
 
-def _felt(layouts: Sequence[PztLayout], strains: Array) -> Indices:
-    """Which of the strains (g, 4, n) feel layers; a curvature about their normal only where modes have it."""
-    felt = np.zeros(4, dtype=bool)
-    for layout in layouts:
-        rows = felt_rows(layout)
-        if not layout.offset and not strains[:, across_row(layout)].any():
-            rows = rows[rows != across_row(layout)]
-        felt[rows] = True
-    return np.flatnonzero(felt)
-
-
 def stiffness_ratios(placed: PlacedLayout, body: ModalBody) -> tuple[Array, Array]:
-    """Return ψ (k,) of each patch, and its authority (k,); NaN without known rigidities of the link.
+    """Return the stiffness ratio ψ (k,) of link to patch, and the authority (k,); NaN without known rigidities.
 
     ψ = E_b A_b / (E_p w N t_p), E_b t_b / (E_p t_p) at equal widths. The authority is the curvature (or twist) under a
-    voltage, in parts of c V/EI (c V/GJ), that of a link which does not feel the layers' stiffness.
+    voltage, relative to c V/EI (c V/GJ), that of a link without the layers' stiffness.
     """
     layout, edges = placed
     sections = link_sections(body)
@@ -160,23 +163,19 @@ def stiffness_ratios(placed: PlacedLayout, body: ModalBody) -> tuple[Array, Arra
         straight = straight_loads(layout, *place_of(layout, sections, station))[own]
         return psi, strain * rigidity[own] / straight
 
-    lengths, alike = _lengths_between_stations(body, edges), sections.alike[:-1]
+    # (k, stations − 1) m of each patch between one station and the next, without slivers
+    x, alike = sections.x, sections.alike[:-1]
+    starts, ends = (edge[:, None] for edge in edges.clip(0.0, body.length).T)
+    lengths = (np.minimum(ends, x[1:]) - np.maximum(starts, x[:-1])).clip(min=0.0)
+    lengths = np.where(lengths > SLIVER * (ends - starts), lengths, 0.0)
     covered = np.unique(alike[lengths.any(axis=0)])
     shares = np.stack([lengths[:, alike == station].sum(axis=1) for station in covered], axis=1)
     found = shares @ np.array([ratios(int(station)) for station in covered]) / shares.sum(axis=1, keepdims=True)
     return found[:, 0], found[:, 1]
 
 
-def _lengths_between_stations(body: ModalBody, intervals: Array) -> Array:
-    """(m, stations − 1) of `intervals` (m, 2) between one station and the next, m, without slivers."""
-    x = body.stations.position[:, 0]
-    starts, ends = (edge[:, None] for edge in intervals.clip(0.0, body.length).T)
-    lengths: Array = (np.minimum(ends, x[1:]) - np.maximum(starts, x[:-1])).clip(min=0.0)
-    return np.where(lengths > SLIVER * (ends - starts), lengths, 0.0)
-
-
 def gauss_points(body: ModalBody, intervals: Array) -> Iterator[GaussPoint]:
-    """Along `intervals` (m, 2). None is integrated across a station: shapes have kinks there, sections steps."""
+    """Yield Gauss points along `intervals` (m, 2), m; none spans a station: shapes have kinks there, sections steps."""
     nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)  # type: ignore[no-untyped-call, unused-ignore]
     stations = body.stations.position[:, 0]
     for number, (start, end) in enumerate(intervals.clip(0.0, body.length)):
@@ -189,27 +188,27 @@ def gauss_points(body: ModalBody, intervals: Array) -> Iterator[GaussPoint]:
 
 
 def place_of(layout: PztLayout, sections: LinkSections, station: int) -> tuple[float, float]:
-    """Extent along the patches' normal (m), as `LinkSections.extent` has it of their face, and β at a station."""
+    """Return the extent along the patches' normal (m), as `LinkSections.extent` of their face, and β at a station."""
     lever = sections.shear_lever(station, layout.normal, layout.width) if layout.lamina.shears else 0.0
     return float(sections.extent(layout.normal, side(layout))[station]), lever
 
 
-def felt_loads(layout: PztLayout, sections: LinkSections, station: int) -> LayerLoads:
-    """Loads C (4, 4) and f (4,) of the layers in the rows that feel them, the section free in the others, else 0.
+def felt_loads(layout: PztLayout, sections: LinkSections, station: int) -> tuple[Array, Array]:
+    """Return C (4, 4) and f (4,) of `layer_loads` in the rows that feel them, else 0; in these the section is free.
 
     Free means that link and layers together carry nothing there: e_d = (C_l + C)_dd⁻¹ (f_d V − C_df e_f), eliminated.
     """
-    loads = layer_loads(layout, *place_of(layout, sections, station))
+    every, of_volt = layer_loads(layout, *place_of(layout, sections, station))
     felt = felt_rows(layout)
-    free = np.setdiff1d([row for row in (bending_row(layout), STRETCH, TWIST) if loads.C[row].any()], felt)
+    free = np.setdiff1d([row for row in (bending_row(layout), STRETCH, TWIST) if every[row].any()], felt)
     C, f = np.zeros((4, 4)), np.zeros(4)
-    C[np.ix_(felt, felt)], f[felt] = loads.C[np.ix_(felt, felt)], loads.f[felt]
+    C[np.ix_(felt, felt)], f[felt] = every[np.ix_(felt, felt)], of_volt[felt]
     rigidity = sections.rigidity[station, free]
     if free.size and not np.isnan(rigidity).any():
-        across = np.linalg.solve(np.diag(rigidity) + loads.C[np.ix_(free, free)], loads.C[np.ix_(free, felt)])
-        C[np.ix_(felt, felt)] -= loads.C[np.ix_(felt, free)] @ across
-        f[felt] -= across.T @ loads.f[free]
-    return LayerLoads(C, f)
+        across = np.linalg.solve(np.diag(rigidity) + every[np.ix_(free, free)], every[np.ix_(free, felt)])
+        C[np.ix_(felt, felt)] -= every[np.ix_(felt, free)] @ across
+        f[felt] -= across.T @ of_volt[free]
+    return C, f
 
 
 def _intervals(placed: Sequence[PlacedLayout]) -> tuple[Array, list[list[tuple[PztLayout, int]]]]:
@@ -254,7 +253,7 @@ class Effects(NamedTuple):
     """Effects of k patches on the n modes of a modal body."""
 
     extent: Array  # (k,) t_b, of the link along their normal under each patch, its mean, m: see `LinkSections.extent`
-    per_volt: Array  # (k,) c, the load that each is there for, N·m/V
+    per_volt: Array  # (k,) c, the load along the strain that each actuates, N·m/V
     lever: Array  # (k,) strain of the surface by unit curvature and distance; by twist, β/2, of its diagonals
     turn: Array  # (k, n) by how much the sections at the patch's ends turn against each other in its own sense, rad
     Phi_V: Array  # (k, n) modal forces per volt, less what the layers' own stiffness takes
@@ -275,41 +274,37 @@ def effects(key: str, placed: Sequence[PlacedLayout], body: ModalBody) -> list[E
 
 
 def _straight(key: str, placed: PlacedLayout, body: ModalBody) -> Effects:
-    """On a link held straight: the loads of a volt times the differences of what they work on, stretch by stretch."""
+    """On a link held straight: the loads of a volt times the differences of `potentials`, stretch by stretch."""
     layout, edges = placed
     own, sections = own_row(layout), link_sections(body)
     starts, ends, stations, first = _stretches(key, layout, body, sections, edges)
     alike, which = np.unique(sections.alike[stations], return_inverse=True)
     places = np.array([place_of(layout, sections, station) for station in alike.tolist()])
-    loads = np.array([straight_loads(layout, *place) for place in places])[which]
+    loads = np.array([straight_loads(layout, *place) for place in places])
     before, after = np.split(potentials(body, np.concatenate([starts, ends])), 2)
     differences = after - before
-    of_stretch = np.stack([places[:, 0], load_per_volt(layout, *places.T), places[:, 1]])[:, which]
+    of_stretch = np.stack([places[:, 0], loads[:, own], places[:, 1]])[:, which]
     extent, c, lever = np.add.reduceat(of_stretch * (ends - starts), first, axis=1) / np.add.reduceat(
         ends - starts, first
     )
     turn = np.add.reduceat(differences[:, own], first)
-    Phi_V = np.add.reduceat(np.einsum("ir,irn->in", loads, differences), first)
+    Phi_V = np.add.reduceat(np.einsum("ir,irn->in", loads[which], differences), first)
     if layout.coupling == "surface":
         membrane = c / (layout.width * extent / 2)
         if layout.strain == "biaxial":
             membrane /= 1.0 - (layout.poissons_ratio or 0.0)
         Phi_V = membrane[:, None] * _outlined(key, layout, body, edges)
-    lever = lever / 2 if layout.acts_in == "twist" else np.ones(len(edges))
+    lever = lever / 2 if layout.bends == "twist" else np.ones(len(edges))
     return Effects(extent, c, lever, turn, Phi_V, np.zeros(len(edges)))
 
 
-class _Stretches(NamedTuple):
-    """Of k patches, one after the other, each m of one extent: `starts`, `ends` (m,), m; `first` (k,) of each patch."""
+def _stretches(
+    key: str, layout: PztLayout, body: ModalBody, sections: LinkSections, edges: Array
+) -> tuple[Array, Array, Indices, Indices]:
+    """Stretches of one extent of k patches between `edges` (k, 2), patch by patch.
 
-    starts: Array
-    ends: Array
-    stations: Indices
-    first: Indices
-
-
-def _stretches(key: str, layout: PztLayout, body: ModalBody, sections: LinkSections, edges: Array) -> _Stretches:
-    """Stretches into which changes of the link's extent cut patches between `edges` (k, 2), and their stations."""
+    Starts and ends (m,), m, their stations (m,), and the first stretch (k,) of each patch.
+    """
     x, (starts, ends) = body.stations.position[:, 0], edges.T
     slack = np.minimum(1e-9 * body.length, 0.25 * (ends - starts))
     covered = (x[1:] > (starts + slack)[:, None]) & (x[:-1] < (ends - slack)[:, None])
@@ -336,11 +331,11 @@ def _stretches(key: str, layout: PztLayout, body: ModalBody, sections: LinkSecti
     first = np.append(0, np.flatnonzero(is_last)[:-1] + 1)
     begin = np.append(0.0, found[:-1])
     begin[first] = np.maximum(starts, 0.0)
-    return _Stretches(begin, found, stations, first)
+    return begin, found, stations, first
 
 
 def _outlined(key: str, layout: PztLayout, body: ModalBody, edges: Array) -> Array:
-    """(k, n) modal forces of unit membrane force (N/m): pressing the upper face, pulling the lower, halved on both.
+    """Modal forces (k, n) of unit membrane force (N/m), pressing the upper face, pulling the lower; the mean of both.
 
     On the layout's face; all that are outlined where it names none. Raises `InputError` where they are not outlined.
     """
@@ -383,3 +378,78 @@ def _outlined(key: str, layout: PztLayout, body: ModalBody, edges: Array) -> Arr
 
 def _places(edges: Array) -> str:
     return ", ".join(f"{start:g} to {end:g}" for start, end in edges)
+
+
+PASSES = 6  # until modes and the stiffness of shunts at their frequencies agree
+
+
+@struct
+class StructureEffect:
+    """Changes of a link by patches, bare → with patches."""
+
+    mass: Array  # (2,) kg
+    inertia: Array  # (2,) about the body's z axis, kg·m²
+    frequency: Array  # (2, n) Hz
+
+
+def patched_body(spatial: Body, body: ModalBody, placed: Sequence[PlacedLayout]) -> Body:
+    """Add mass and stiffness of patches to a link or a piece of it, as the layouts ask; all modes are kept.
+
+    Mass lies in the plane of the patches' normal at their offset from the axis, with its moment of inertia about the
+    line that it is on, ∫ρ (η² + ζ²) dA. The stiffness is that of the `composite` section.
+    """
+    T, sections = spatial.modal_transform, link_sections(body)
+    points, masses, spins = [], [], []
+    for layout, edges in placed:
+        extent = sections.extent(layout.normal, side(layout))
+        arm = layout.offset * np.eye(3)[2 if layout.normal == "y" else 1]
+        for place in gauss_points(body, edges) if layout.adds_mass else ():
+            at = body.interpolate(place.x)
+            moved = at.translation - skew(arm) @ at.rotation
+            points.append(BodyPoint(at.position + arm, moved @ T, at.rotation @ T))
+            A, _, I = layer_section(layout, extent[place.station])  # noqa: E741
+            line_density = place.weight * (layout.density or 0.0)
+            masses.append(line_density * A)
+            spins.append(line_density * (I + A * layout.width**2 / 12))
+    stiff = [one for one in placed if one.layout.adds_stiffness]
+    added = T.T @ composite(stiff, body)[0] @ T if stiff else np.zeros((spatial.n_modes, spatial.n_modes))
+    patched = with_line_masses(spatial, points, np.array(masses), np.array(spins), added)
+    return _with_charges(patched, body, stiff) if any(one.layout.gives_way for one in stiff) else patched
+
+
+def _with_charges(patched: Body, body: ModalBody, placed: Sequence[PlacedLayout]) -> Body:
+    """Return the body with the effect of the charges of patches with open electrodes, or a resistor of R Ω each.
+
+    With the charge q = C V + Φᵀp and V = −R q̇ a patch has the dynamic stiffness Φ iωR/(1 + iωRC) Φᵀ (Hagood and von
+    Flotow, J. Sound Vib. 146, 1991), ΦΦᵀ/C where R is infinite. Its stiffness and damping are those at the frequency
+    of each mode that they lead to.
+    """
+    layers = layers_on_link(placed, body)
+    layouts = [one.layout for one in placed for _ in one.edges]
+    share = np.diff(np.concatenate([one.edges for one in placed]))[:, 0] / [of.length for of in layouts]
+    charged = np.flatnonzero([of.gives_way for of in layouts])
+    C = np.array([of.capacitance(clamped=True) for of in layouts]) * share + layers.yielding
+    Phi = (layers.by_volts.T @ layers.B @ patched.modal_transform)[charged] / np.sqrt(C[charged])[:, None]
+    R = np.array([layouts[k].shunt or np.inf for k in charged]) / share[charged]
+    K, modes = np.diag(patched.stiffness), np.eye(patched.n_modes)
+    values, added = patched.stiffness, np.zeros_like(K)
+    for _ in range(PASSES):
+        omega = np.sqrt(values.clip(min=SMALLEST))
+        with np.errstate(divide="ignore"):
+            lag = 1.0 / np.multiply.outer(R * C[charged], omega)  # 1/(ωRC)
+        stiff = Phi @ modes / np.sqrt(1.0 + lag**2) @ modes.T
+        damps = Phi @ modes * np.sqrt(lag / (omega * (1.0 + lag**2))) @ modes.T
+        added = stiff.T @ stiff
+        values, modes = np.linalg.eigh(K + added)
+    with_damping = replace(patched, damping=patched.damping + damps.T @ damps)
+    return with_line_masses(with_damping, (), np.zeros(0), np.zeros(0), added)
+
+
+def structure_effect_of(bare: Body, patched: Body) -> StructureEffect:
+    """Return the changes of a link by its patches."""
+    pair = (bare, patched)
+    return StructureEffect(
+        np.array([body.mass for body in pair]),
+        np.array([body.inertia[2, 2] for body in pair]),
+        np.array([np.sqrt(body.stiffness) / (2 * np.pi) for body in pair]),
+    )

@@ -1,8 +1,8 @@
 """Patches of a link: several layouts side by side, their reach, and voltages that they find together.
 
-The modes to be served are those of the link that moves in the families which some patch reaches, and in no other:
-in-plane bending by patches on ±y, out-of-plane bending by those on ±z, torsion by fibers at an angle, the axial family
-by one named face. Modal forces on the other families are left as they are: voltages leave them unmet.
+Patches serve the modes of the families that some patch reaches: in-plane bending by patches on ±y, out-of-plane bending
+by those on ±z, torsion by fibers at an angle, the axial family by one named face. Voltages leave the modal forces on
+other families unmet.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
 import numpy as np
 
@@ -22,17 +22,14 @@ from ...mbs import _core
 from ...mbs.model.amplifiers import Amplifiers, joined
 from ...mbs.model.body import Body
 from ...mbs.model.divided_link import spread_of
-from .composite import Effects, PlacedLayout, effects
+from .composite import SLIVER, Effects, PlacedLayout, effects
 from .patches import (
     PatchArray,
     Reach,
     ReachedModes,
     Voltages,
     allocation,
-    assembled,
-    check_all_served,
     check_edges,
-    edges_on_piece,
     patch_edges,
     reached_modes,
     served_first,
@@ -49,7 +46,7 @@ WIDE = 3.0  # of its length: a link that wide keeps its sections flat, whatever 
 class OnBody:
     """Effects of all k patches of a link on one body that carries them, on the n modes of the body's file."""
 
-    Phi_V: Array  # (n, k) modal forces per volt
+    Phi_V: Array  # (n, k) modal forces per volt, N/(√kg·V)
     turn: Array  # (n, k) by how much each mode turns the ends of each patch against each other, rad
     to_link: Array  # modal forces on the modes of the link's file by those on these, (modes of the link, n)
     charge: Array  # (n, k) of each patch per unit of each mode, C; Φ_V, of patches that no voltage drives, too
@@ -75,15 +72,15 @@ class LinkPatches:
     @property
     def body(self) -> str:
         """Name of the link."""
-        return next(iter(self.arrays.values())).body
+        return next(iter(self.arrays.values())).layout.body
 
     @property
     def Phi_V(self) -> Array:
-        """Modal forces per volt (n, k), on the modes of the link's file."""
+        """Modal forces per volt (n, k), N/(√kg·V), on the modes of the link's file."""
         return self.bodies[self.body].Phi_V
 
     def voltages(self, F_p: Array) -> dict[str, Voltages]:
-        """Return voltages (T, k), V, by layout for modal forces F_p (T, n), N/√kg; `unmet`: what all layouts leave."""
+        """Return the voltages by layout for modal forces F_p (T, n), N/√kg; `unmet`: what all layouts leave."""
         found = solve_voltages(self.reach, self.reached.forces(F_p))
         return self._by_layout(found.required, found.within_limit, F_p)
 
@@ -94,16 +91,16 @@ class LinkPatches:
 
     @property
     def driven(self) -> Array:
-        """(k,) whether voltages drive them: the modal forces of others are left out."""
+        """Whether voltages drive each patch (k,)."""
         return driven_patches(self.arrays.values())
 
     @property
     def edges(self) -> Array:
-        """Begin and end (k, 2) of patches, m from the root."""
+        """Where the patches begin and end (k, 2), m from the root."""
         return np.concatenate([array.edges for array in self.arrays.values()])
 
     def at_voltages(self, V: Array, F_p: Array) -> dict[str, Voltages]:
-        """Return, by layout, given voltages V (T, k) and the modal forces F_p (T, n) they leave unmet."""
+        """Return given voltages V (T, k), V, by layout, with what they leave of modal forces F_p (T, n), N/√kg."""
         return self._by_layout(V, np.clip(V, *self.amplifiers.range), F_p)
 
     def _by_layout(self, required: Array, within: Array, F_p: Array) -> dict[str, Voltages]:
@@ -124,24 +121,25 @@ class LinkPatches:
         return {name: self.reached.forces(of.to_link.T).T for name, of in self.bodies.items()}
 
     def on_link(self, modal: Mapping[str, Array]) -> Array:
-        """Modal forces (T, …) on the modes of the link's file, by those of bodies that carry it on theirs."""
+        """Modal forces (T, n), N/√kg, on the modes of the link's file, by those of bodies that carry it on theirs."""
         found = [modal[name] @ of.to_link.T for name, of in self.bodies.items() if name in modal]
         return as_floats(np.sum(found, axis=0))
 
     def allocation(self, *, limited: bool) -> _core.Allocation:
-        """Return the map from modal forces on `reached` to voltages (k,), with limits of the patches or without."""
+        """Return the map from modal forces on `reached`, N/√kg, to voltages (k,), V, within limits or without."""
         return allocation(self.reach, limited=limited)
 
     def placed_on(self, start: float, length: float) -> list[tuple[Indices, PlacedLayout]]:
-        """Return, by layout, indices of its patches on a piece of the link, and their position there.
+        """Return, by layout, indices (k,) of its patches on a piece of the link, and their position there.
 
         The piece is `length` (m) long and begins at `start` (m) from the root.
         """
         found = []
         for label, array in self.arrays.items():
-            which, edges = edges_on_piece(array.layout, array.edges, start, length)
+            edges = (array.edges - start).clip(0.0, length)
+            which = np.flatnonzero(np.diff(edges, axis=1)[:, 0] > SLIVER * array.layout.length)
             if which.size:
-                found.append((self.columns(label).start + which, PlacedLayout(array.layout, edges)))
+                found.append((self.columns(label).start + which, PlacedLayout(array.layout, edges[which])))
         return found
 
     def columns(self, layout: str) -> slice:
@@ -157,29 +155,42 @@ class LinkPatches:
 
 
 def driven_patches(placed: Iterable[PlacedLayout | PatchArray]) -> Array:
-    """Return (k,) whether voltages drive the patches."""
+    """Return whether voltages drive each patch (k,)."""
     return np.concatenate([np.full(len(one.edges), one.layout.is_driven) for one in placed])
 
 
 def placed_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody) -> list[PlacedLayout]:
-    """Return the positions of layouts on their link. Raises `InputError` for patches that do not fit it."""
-    return [_placed(path, layout, body) for layout in layouts]
+    """Return layouts with the positions of their patches on the link, and their strain across it.
+
+    Wide links hold layers across; outlined faces strain across as the solid does. Raises `InputError` for patches that
+    do not fit the link.
+    """
+    placed = []
+    for layout in layouts:
+        key, edges = _key(path, layout.label), patch_edges(layout, body.length)
+        check_sections(key, body, layout.normal, twists=layout.fibre_angle is not None)
+        check_edges(key, edges, body.length)
+        check_width(key, body, layout, edges)
+        across = link_sections(body).extent("z" if layout.normal == "y" else "y")
+        is_wide = layout.coupling == "surface" or bool(np.nanmax(across, initial=0.0) >= WIDE * body.length)
+        plain = layout.fibre_angle is None and layout.poissons_ratio is not None
+        strain = layout.strain or ("biaxial" if plain and is_wide else "uniaxial")
+        placed.append(PlacedLayout(layout.model_copy(update={"strain": strain}), edges))
+    return placed
 
 
 def link_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody, spatial: Body) -> LinkPatches:
     """Place the layouts of one link: they serve all modes of its file that they reach; see `on_kept_modes`, too.
 
-    Raises `InputError` for patches that do not fit the link, or weights that do not.
+    `spatial`: the equations of the link. Raises `InputError` for patches or weights that do not fit the link.
     """
     spatial = spatial.whole
     key = _key(path, layouts[0].label if len(layouts) == 1 else layouts[0].body)
     placed = placed_patches(path, layouts, body)
     found = effects(key, placed, body)
-    charge, turn, yielding = _side_by_side(found)
-    driven = driven_patches(placed)
+    charge, turn = (np.concatenate(of).T for of in ([one.Phi_V for one in found], [one.turn for one in found]))
+    yielding, driven = np.concatenate([one.yielding for one in found]), driven_patches(placed)
     modes = {one.layout.label: reached_modes(of.Phi_V, body, spatial) for one, of in zip(placed, found, strict=True)}
-    for layout in layouts:
-        _check_reached(path, layout, modes[layout.label], body)
     arrays = {
         one.layout.label: _array(path, one, body, spatial, of, modes[one.layout.label])
         for one, of in zip(placed, found, strict=True)
@@ -193,42 +204,55 @@ def link_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody, spat
     if not driven.all():
         reach = replace(reach, Phi_V=reach.Phi_V * driven)
     own = {layouts[0].body: OnBody(charge * driven, turn, np.eye(body.mode_count), charge, yielding)}
-    return LinkPatches(arrays, modes, reach, reached, own, _slowness(body))
-
-
-def _side_by_side(found: Sequence[Effects]) -> tuple[Array, Array, Array]:
-    """Φ_V (n, k), turns (n, k) and what capacitances gain (k,) of all patches."""
-    Phi_V, turn, yielding = (
-        np.concatenate(of) for of in zip(*((one.Phi_V, one.turn, one.yielding) for one in found), strict=True)
-    )
-    return Phi_V.T, turn.T, yielding
-
-
-def _slowness(body: ModalBody) -> float:
-    """√(ρA/EI) in s/m², of the mode that bends the link most softly: ω² = ∫ EI φ''² dx."""
-    x, rotation = body.stations.position[:, 0], body.stations.rotation[:, 1:]
-    bent = np.diff(rotation, axis=0) ** 2 / np.diff(x)[:, None, None]
-    return float(np.sqrt(body.mass / body.length * (bent.sum(axis=(0, 1)) / np.diag(body.stiffness)).max(initial=0.0)))
+    # √(ρA/EI) of the mode that bends the link most softly: ω² = ∫ EI φ''² dx
+    bent = np.diff(body.stations.rotation[:, 1:], axis=0) ** 2 / np.diff(body.stations.position[:, 0])[:, None, None]
+    softest = (bent.sum(axis=(0, 1)) / np.diag(body.stiffness)).max(initial=0.0)
+    return LinkPatches(arrays, modes, reach, reached, own, float(np.sqrt(body.mass / body.length * softest)))
 
 
 def check_reach(path: Path, of_link: LinkPatches) -> None:
-    """Raise `InputError` unless patches reach all modes that they are to serve, or the scene is content with less."""
+    """Raise `InputError` unless patches reach all modes that they are to serve, or the scene allows less."""
     layouts = [array.layout for array in of_link.arrays.values() if array.layout.is_driven]
-    if layouts and all(layout.allocation == "exact" for layout in layouts):
-        check_all_served(_key(path, layouts[0].label if len(layouts) == 1 else of_link.body), of_link.reach)
+    if not layouts or any(layout.allocation != "exact" for layout in layouts):
+        return
+    key, reach = _key(path, layouts[0].label if len(layouts) == 1 else of_link.body), of_link.reach
+    advice = 'or accept unmet modal forces: allocation = "least-squares"'
+    n, k = reach.served, reach.Phi_V.shape[1]
+    if not n:
+        raise InputError(f"{key}: expected modes of the link for the patches to serve", "none")
+    if k < n:
+        raise InputError(f"{key}: expected as many patches as modes ({n}) or more", f"{k}: add patches, {advice}")
+    if (unreached := reach.unreached_modes).size:
+        modes = ", ".join(f"{j + 1} ({reach.frequency[j]:.4g} Hz)" for j in unreached)
+        condition = min(reach.condition_number, 1e16)  # beyond is round-off
+        raise InputError(
+            f"{key}: expected patches that excite every mode",
+            f"a singular Φ_V (condition number {condition:.1g}): no voltages serve mode {modes}; move patches,"
+            f" {advice}",
+        )
 
 
 def on_pieces(
     path: Path, whole: LinkPatches, link: ModalBody, pieces: Mapping[str, tuple[float, ModalBody]]
 ) -> LinkPatches:
-    """The patches of a link, on its pieces as well: a patch across a cut acts on both sides of it.
+    """Return the patches of a link on its pieces as well: a patch across a cut acts on both sides of it.
 
     `pieces` by name from the root to the tip: where each begins, m from the root, and its modal body. Raises
-    `InputError` for charges that pieces would change.
+    `InputError` for electrodes that a cut divides, and for shunts, which act at the frequencies of the link's modes.
     """
     cuts = np.array([start for start, _ in pieces.values()])[1:]
-    for array in whole.arrays.values():
-        _check_charges(path, array, cuts)
+    for label, array in whole.arrays.items():
+        layout, slack = array.layout, 1e-6 * array.layout.length
+        if layout.shunt is not None:
+            key = f"{_key(path, label)}: shunt"
+            raise InputError(f"{key}: expected a link in one piece with a shunt", f"{len(pieces)} pieces")
+        through = ((cuts > array.edges[:, :1] + slack) & (cuts < array.edges[:, 1:] - slack)).any(axis=0)
+        if layout.gives_way and through.any():
+            raise InputError(
+                f"{_key(path, label)}: electrodes: expected no cut between pieces through a patch with electrodes ="
+                ' "open"',
+                f"one at {cuts[through][0]:g} m: change pieces, or centers",
+            )
     body, bodies = whole.body, {whole.body: whole.bodies[whole.body]}
     spread = spread_of(link, list(pieces.values()))
     ends = np.cumsum([modal.mode_count for _, modal in pieces.values()])
@@ -242,25 +266,8 @@ def on_pieces(
     return replace(whole, bodies=bodies)
 
 
-def _check_charges(path: Path, array: PatchArray, cuts: Array) -> None:
-    """Raise `InputError` for electrodes that `cuts` (k,), m, of the link would divide, or shunts of any of its pieces.
-
-    Shunts act at the frequencies of the link's modes, which are not those of pieces.
-    """
-    layout, slack = array.layout, 1e-6 * array.layout.length
-    where = f"{_key(path, layout.label)}: {'shunt' if layout.shunt is not None else 'electrodes'}"
-    if layout.shunt is not None:
-        raise InputError(f"{where}: expected a link in one piece with a shunt", f"{len(cuts) + 1} pieces")
-    through = ((cuts > array.edges[:, :1] + slack) & (cuts < array.edges[:, 1:] - slack)).any(axis=0)
-    if layout.gives_way and through.any():
-        raise InputError(
-            f'{where}: expected no cut between pieces through a patch with electrodes = "open"',
-            f"one at {cuts[through][0]:g} m: change pieces, or centers",
-        )
-
-
 def with_count(path: Path, layout: PztLayout, body: ModalBody, spatial: Body, count: int) -> LinkPatches | None:
-    """Return `count` such patches alone, evenly spaced, with one limit; None if they do not fit the link."""
+    """Return `count` patches of a layout alone, evenly spaced, with one limit; None if they do not fit the link."""
     if count * layout.length > body.length * (1 + 1e-9):
         return None
     try:
@@ -269,47 +276,38 @@ def with_count(path: Path, layout: PztLayout, body: ModalBody, spatial: Body, co
         return None
 
 
-def _placed(path: Path, layout: PztLayout, body: ModalBody) -> PlacedLayout:
-    key, edges = _key(path, layout.label), patch_edges(layout, body.length)
-    check_sections(key, body, layout.normal, twists=layout.fibre_angle is not None)
-    check_edges(key, edges, body.length)
-    check_width(key, body, layout, edges)
-    return PlacedLayout(layout.model_copy(update={"strain": layout.strain or _strain(layout, body)}), edges)
-
-
-def _strain(layout: PztLayout, body: ModalBody) -> Literal["uniaxial", "biaxial"]:
-    """Held across on wide links; outlined faces strain across as the solid does."""
-    across = link_sections(body).extent("z" if layout.normal == "y" else "y")
-    is_wide = layout.coupling == "surface" or bool(np.nanmax(across, initial=0.0) >= WIDE * body.length)
-    plain = layout.fibre_angle is None and layout.poissons_ratio is not None
-    return "biaxial" if plain and is_wide else "uniaxial"
-
-
-def _check_reached(path: Path, layout: PztLayout, modes: ReachedModes, body: ModalBody) -> None:
-    if not modes.served:
-        families = ", ".join(dict.fromkeys(map(str, body.family[: body.eigenmode_count]))) or "none"
-        raise InputError(
-            f'{_key(path, layout.label)}: bends: expected eigenmodes of the link that patches for "{layout.acts_in}"'
-            " reach",
-            f"eigenmodes in {families}: add such modes ([modes] family, a larger count), or move the patches",
-        )
-
-
 def _array(
     path: Path, placed: PlacedLayout, body: ModalBody, spatial: Body, of: Effects, modes: ReachedModes
 ) -> PatchArray:
-    T_inverse = spatial.on_file
-    points = {name: modes.seen(at.translation @ T_inverse) for name, at in spatial.points.items()}
-    W_sqrt = weights(_key(path, placed.layout.label), placed.layout, modes.served, modes.stiffness, points)
-    to_modes = np.zeros((body.mode_count, len(modes.rows)))
-    to_modes[modes.rows] = modes.T
-    return assembled(placed, body, of, to_modes, stiffness=modes.stiffness, W_sqrt=W_sqrt, served=modes.served)
+    (layout, edges), key = placed, _key(path, placed.layout.label)
+    if not modes.served:
+        families = ", ".join(dict.fromkeys(map(str, body.family[: body.eigenmode_count]))) or "none"
+        raise InputError(
+            f'{key}: bends: expected eigenmodes of the link that patches for "{layout.bends}" reach',
+            f"eigenmodes in {families}: add such modes ([modes] family, a larger count), or move the patches",
+        )
+    points = {name: modes.seen(at.translation @ spatial.on_file) for name, at in spatial.points.items()}
+    return PatchArray(
+        layout=layout,
+        edges=edges,
+        height=of.extent,
+        moment_per_volt=of.per_volt,
+        turn=modes.seen(of.turn).T,
+        link=body,
+        lever=of.lever,
+        read_capacitance=layout.read_capacitance(of.yielding),
+        Phi_V=modes.seen(of.Phi_V).T,
+        amplifiers=layout.amplifiers(),
+        W_sqrt=weights(key, layout, modes.served, modes.stiffness, points),
+        frequency=np.sqrt(modes.stiffness) / (2 * np.pi),
+        served=modes.served,
+    )
 
 
 def _together(
     path: Path, layouts: Sequence[PztLayout], arrays: Mapping[str, PatchArray], reached: ReachedModes, per_volt: Array
 ) -> Reach:
-    """Of layouts side by side: all modal forces that are left count alike."""
+    """Reach of layouts side by side: all modal forces that are left count alike."""
     for layout in layouts:
         if layout.mode_weights is not None or layout.point_weights is not None:
             beside = f'with other layouts on "{layout.body}"'
@@ -329,7 +327,7 @@ def _key(path: Path, label: str) -> str:
 
 
 def on_kept_modes(of_link: LinkPatches, equations: Body) -> LinkPatches:
-    """The patches of a link whose `equations` may have fewer modes than its file; the same where they reach all modes.
+    """Return the patches of a link whose `equations` may have fewer modes than its file; the same if they serve all.
 
     Modal forces on modes left out follow from the loads on the link. Patches that cannot produce all of these produce
     those on the coordinates that are kept, and may bend the link in the others.
@@ -338,12 +336,12 @@ def on_kept_modes(of_link: LinkPatches, equations: Body) -> LinkPatches:
         return of_link
     modes = {layout: _kept(reached, equations) for layout, reached in of_link.modes.items()}
     reached = _kept(of_link.reached, equations)
-    arrays = {layout: _kept_array(of_link, layout, modes[layout], equations) for layout in of_link.arrays}
-    W_sqrt = of_link.reach.W_sqrt @ _lift(of_link.reached, equations)
-    reach = replace(
-        of_link.reach, Phi_V=reached.seen(of_link.Phi_V.T).T, W_sqrt=W_sqrt,
-        frequency=np.sqrt(reached.stiffness) / (2 * np.pi), served=reached.served,
-    )  # fmt: skip
+    on_link, arrays = of_link.bodies[of_link.body], {}
+    for layout, array in of_link.arrays.items():
+        columns, kept = of_link.columns(layout), modes[layout]
+        changes = _on_kept(array, of_link.modes[layout], kept, on_link.Phi_V[:, columns], equations)
+        arrays[layout] = replace(array, turn=kept.seen(on_link.turn[:, columns].T).T, **changes)
+    reach = replace(of_link.reach, **_on_kept(of_link.reach, of_link.reached, reached, on_link.Phi_V, equations))
     on_kept = as_floats(equations.modal_transform @ equations.on_file)
     return replace(of_link, arrays=arrays, modes=modes, reach=reach, reached=reached, on_kept=on_kept)
 
@@ -361,15 +359,12 @@ def _kept(reached: ReachedModes, equations: Body) -> ReachedModes:
     return ReachedModes(reached.rows, T, equations.stiffness[columns], served)
 
 
-def _lift(reached: ReachedModes, equations: Body) -> Array:
-    """(m, m') forces on all modes that patches reach from those on the coordinates kept."""
-    return reached.forces(equations.on_file[_columns(reached, equations)]).T
-
-
-def _kept_array(of_link: LinkPatches, layout: str, kept: ReachedModes, equations: Body) -> PatchArray:
-    array, columns, on_link = of_link.arrays[layout], of_link.columns(layout), of_link.bodies[of_link.body]
-    return replace(
-        array, turn=kept.seen(on_link.turn[:, columns].T).T, Phi_V=kept.seen(on_link.Phi_V[:, columns].T).T,
-        W_sqrt=array.W_sqrt @ _lift(of_link.modes[layout], equations),
-        frequency=np.sqrt(kept.stiffness) / (2 * np.pi), served=kept.served,
-    )  # fmt: skip
+def _on_kept(reach: Reach, reached: ReachedModes, kept: ReachedModes, Phi_V: Array, equations: Body) -> dict[str, Any]:
+    """Fields of a `reach` on the modes `kept` of those `reached`; Φ_V is on the modes of the file."""
+    lift = reached.forces(equations.on_file[_columns(reached, equations)]).T  # forces on all that patches reach
+    return {
+        "Phi_V": kept.seen(Phi_V.T).T,
+        "W_sqrt": reach.W_sqrt @ lift,
+        "frequency": np.sqrt(kept.stiffness) / (2 * np.pi),
+        "served": kept.served,
+    }

@@ -1,8 +1,9 @@
-"""Patches of a scene file, key by key: which way they bend their link, and fibers at an angle. SI units."""
+"""Patches of a scene file, key by key, their amplifiers and hysteresis, and one layer of them by itself. SI units."""
 
 import json
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Literal, Self
+from functools import lru_cache
+from typing import Annotated, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -14,20 +15,126 @@ from ...common.validation import Record
 from ...mbs.fields.field_types import Name, NotEmpty, NotNegative, PatchCount, Positive, Quantity, Reference, one_of
 from ...mbs.fields.spelling import IN_SPACE, Spelled
 from ...mbs.model.amplifiers import MOST_PLAYS, Amplifiers
-from .lamina import Fibres, Lamina, fibre_lamina, plain_lamina
-from .voltage_records import Amplifier, HysteresisKeys
-
-MOST_LAYERS = 1000
 
 Face = Literal["+y", "-y", "+z", "-z", "both"]
-Bends = Literal["in-plane", "out-of-plane", "twist"]
-
 FACES = {"in-plane": ("+y", "-y", "both"), "out-of-plane": ("+z", "-z", "both")}
 OF_FIBRES = ("fibre_angle", "d33", "modulus_across", "shear_modulus", "poissons_ratio")
 NO_SHEAR = 1e-9  # of the other stress: a layer that shears less does not twist
 
+Each = Positive | Annotated[tuple[Positive, ...], NotEmpty]
+Range = tuple[float, float]
 
-PERMITTIVITY = 1700 * 8.8541878128e-12  # F/m, of PZT-5A along the field, free
+
+class Amplifier(Record):
+    """Amplifier of the patches of a layout, each key with one value for all patches or a list with one for each.
+
+    The largest current limits C dV/dt and the charge of the strain together. `tracking` and `feasibility` take range,
+    current and slew rate as limits; forward runs with `limits = true` and closed-loop control cut voltages at them.
+    Bandwidth and delay act in both.
+    """
+
+    range: Range | Annotated[tuple[Range, ...], NotEmpty] | None = None
+    """Smallest and largest voltage, V, such as [-50.0, 200.0]; default: plus and minus `limit`."""
+    current: Each | None = None
+    """Largest current, A."""
+    slew: Each | None = None
+    """Largest rate of the voltage, V/s."""
+    bandwidth: Each | None = None
+    """Bandwidth of first order, Hz."""
+    delay: NotNegative | Annotated[tuple[NotNegative, ...], NotEmpty] = 0.0
+    """Delay of the voltage, s."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        for lowest, highest in np.reshape(() if self.range is None else self.range, (-1, 2)):
+            if not lowest < 0.0 < highest:
+                raise ValueError(
+                    "range: expected a negative and a positive voltage, as patches are at 0 V where the robot rests,"
+                    f" found [{lowest:g}, {highest:g}]"
+                )
+        return self
+
+    def lists(self) -> Iterator[tuple[str, int]]:
+        """Keys with a list, and its length."""
+        for key in type(self).model_fields:
+            if np.ndim(value := getattr(self, key)) == (2 if key == "range" else 1):
+                yield key, len(value)
+
+
+class HysteresisKeys(Record):
+    """Hysteresis of the patches of a layout in forward runs, closed-loop control and loads: play operators.
+
+    Under a voltage V a patch acts as under Σ w z: z follows V at the distance of a threshold. The other analyses plan
+    without it.
+    """
+
+    weights: Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_PLAYS)]
+    """Weights w."""
+    thresholds: tuple[NotNegative, ...]
+    """Thresholds, V, ascending from 0."""
+    compensate: bool = False
+    """Inverse of the hysteresis in front of computed voltages and of controllers."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if len(self.thresholds) != len(self.weights):
+            raise ValueError(f"expected {len(self.weights)} thresholds, as weights, found {len(self.thresholds)}")
+        if self.thresholds[0] != 0.0 or min(np.diff(self.thresholds), default=1.0) <= 0.0:
+            raise ValueError(f"thresholds: expected ascending voltages from 0 on, found {list(self.thresholds)}")
+        return self
+
+
+class Lamina(NamedTuple):
+    """Stress (σ_x, τ_xs) = C (ε_x, γ_xs) − C Λ V, Pa, of one layer; x along the link, s across it in the layer."""
+
+    C: Array  # (2, 2) Pa
+    per_volt: Array  # (2,) C Λ, Pa/V: the stress that a volt takes off a layer which is held
+    energy: float  # (C Λ) Λ, Pa/V²: what a held layer lacks of its permittivity times the field of a volt, squared
+
+    @property
+    def shears(self) -> bool:
+        """Whether shear loads it, or is loaded by a voltage."""
+        return bool(self.C[:, 1].any() or self.per_volt[1])
+
+
+@lru_cache
+def plain_lamina(
+    modulus: float, d31: float, thickness: float, nu: float | None = None, *, held: bool = False
+) -> Lamina:
+    """Lamina of a ceramic isotropic in its plane: `modulus` (Pa), `d31` (m/V), electrodes `thickness` (m) apart.
+
+    Its free strain is alike in all directions: it never shears. Free across (σ_s = 0): E = 1/s_11 and E d31. With
+    ν = −s_12/s_11 `held` across (ε_s = 0): E/(1 − ν²) and d31/(s_11 + s_12) = E d31/(1 − ν). A link that stands still
+    holds it in both directions.
+    """
+    ratio, stress = nu or 0.0, modulus * d31 / thickness
+    across = ratio if held else 0.0
+    C, per_volt = np.diag([modulus / (1.0 - across**2), 0.0]), np.array([stress / (1.0 - across), 0.0])
+    return Lamina(C, per_volt, stress * d31 / thickness * (1.0 if nu is None else 2.0 / (1.0 - ratio)))
+
+
+@lru_cache
+def fibre_lamina(
+    *, E_1: float, E_2: float, G_12: float, nu_12: float, d33: float, d31: float, angle: float, spacing: float
+) -> Lamina:
+    """Lamina of parallel fibers at an `angle` (rad) from x, σ_s = 0: transformed compliances (Jones 1999, 2.6).
+
+    Moduli in Pa, d33 along and d31 across the fibers in m/V; a volt is a field of 1/`spacing`, 1/m.
+
+        S̄_11 = S_11 c⁴ + (2 S_12 + S_66) s²c² + S_22 s⁴
+        S̄_16 = (2 S_11 − 2 S_12 − S_66) s c³ − (2 S_22 − 2 S_12 − S_66) s³c
+        S̄_66 = 2 (2 S_11 + 2 S_22 − 4 S_12 − S_66) s²c² + S_66 (s⁴ + c⁴)
+
+    C = [[S̄_11, S̄_16], [S̄_16, S̄_66]]⁻¹; free strains of a unit field ε_x = d33 c² + d31 s², γ_xs = 2 (d33 − d31) s c.
+    """
+    c, s = np.cos(angle), np.sin(angle)
+    S_11, S_22, S_12, S_66 = 1 / E_1, 1 / E_2, -nu_12 / E_1, 1 / G_12
+    S_xx = S_11 * c**4 + (2 * S_12 + S_66) * s**2 * c**2 + S_22 * s**4
+    S_xs = (2 * S_11 - 2 * S_12 - S_66) * s * c**3 - (2 * S_22 - 2 * S_12 - S_66) * s**3 * c
+    S_ss = 2 * (2 * S_11 + 2 * S_22 - 4 * S_12 - S_66) * s**2 * c**2 + S_66 * (s**4 + c**4)
+    C = np.linalg.inv(np.array([[S_xx, S_xs], [S_xs, S_ss]]))
+    free = np.array([d33 * c**2 + d31 * s**2, 2 * (d33 - d31) * s * c]) / spacing
+    return Lamina(C, C @ free, float(free @ C @ free))
 
 
 class PztLayout(Record):
@@ -68,9 +175,9 @@ class PztLayout(Record):
     """Amplifier of the patches."""
     hysteresis: HysteresisKeys | None = None
     """Hysteresis of the patches."""
-    permittivity: Positive = PERMITTIVITY
+    permittivity: Positive = 1700 * 8.8541878128e-12
     """Permittivity along the field at constant stress, F/m, for the capacitance; default: that of PZT-5A."""
-    layers: Annotated[int, Field(gt=0, le=MOST_LAYERS)] = 1
+    layers: Annotated[int, Field(gt=0, le=1000)] = 1
     """Number of stacked layers."""
     face: Annotated[Face | None, Spelled(Literal["+y", "-y", "both"])] = None
     """Face of the link; without it patches only bend or twist the link."""
@@ -91,7 +198,7 @@ class PztLayout(Record):
     """Coupling to the link: section rotations at patch ends, or faces outlined in the mesh of a solid."""
     name: Name | None = None
     """Name of the layout in results; default: the name of the body."""
-    bends: Annotated[Bends, IN_SPACE] = "in-plane"
+    bends: Annotated[Literal["in-plane", "out-of-plane", "twist"], IN_SPACE] = "in-plane"
     """Deformation: along y by patches on faces ±y, along z by patches on faces ±z, or "twist" about x by fibers at an
     angle, by default on ±y."""
     fibre_angle: Annotated[Quantity | None, IN_SPACE] = None
@@ -120,10 +227,24 @@ class PztLayout(Record):
         self._check_constants()
         if isinstance(self.limit, tuple) and len(self.limit) != self.patch_count:
             raise ValueError(f"expected {self.patch_count} limits, one for each patch, found {len(self.limit)}")
-        self._check_amplifier()
+        for key, found in self.amplifier.lists() if self.amplifier is not None else ():
+            if found != self.patch_count:
+                raise ValueError(
+                    f"amplifier: {key}: expected {self.patch_count} values, one for each patch, found {found}"
+                )
+        if self.limit is not None and self.amplifier is not None and self.amplifier.range is not None:
+            raise ValueError('expected one of the keys "limit" and "amplifier.range", found both')
+        uses = self.amplifier is not None or "permittivity" in self.model_fields_set or self.gives_way
+        if uses and self.capacitance(clamped=True) <= 0.0:
+            least = self.permittivity * (1.0 - self.capacitance(clamped=True) / self.capacitance())
+            raise ValueError(
+                f"expected a permittivity above {least:.4g} F/m, the square of the piezoelectric constant times the"
+                f" modulus, which leaves the energy positive, found {self.permittivity:g}"
+            )
         self._check_electrodes()
         if self.adds_mass and self.density is None:
-            raise ValueError(f'expected the key "density" with structural = {_toml(self.structural)}, found none')
+            structural = "true" if self.structural is True else json.dumps(list(self.structural or ()))
+            raise ValueError(f'expected the key "density" with structural = {structural}, found none')
         if self.mode_weights is not None and self.point_weights is not None:
             raise ValueError('expected one of the keys "mode_weights" and "point_weights", found both')
         for weights in (self.mode_weights, self.point_weights and tuple(self.point_weights.values())):
@@ -132,7 +253,7 @@ class PztLayout(Record):
         return self
 
     def _check_constants(self) -> None:
-        """Raise `ValueError` for patches that do nothing, or not what `bends` says."""
+        """Raise `ValueError` for patches without effect, or with another one than `bends` says."""
         given = [key for key in (*OF_FIBRES[:-1], "electrode_spacing") if getattr(self, key) is not None]
         if not given:
             self._check_plain()
@@ -150,39 +271,22 @@ class PztLayout(Record):
             found = "none" if self.face is None else 'coupling = "surface"'
             raise ValueError(f'expected a face and coupling = "rotation" with an offset, found {found}')
 
-    def _check_amplifier(self) -> None:
-        for key, found in self.amplifier.lists() if self.amplifier is not None else ():
-            if found != self.patch_count:
-                raise ValueError(
-                    f"amplifier: {key}: expected {self.patch_count} values, one for each patch, found {found}"
-                )
-        if self.limit is not None and self.amplifier is not None and self.amplifier.range is not None:
-            raise ValueError('expected one of the keys "limit" and "amplifier.range", found both')
-        uses = self.amplifier is not None or "permittivity" in self.model_fields_set or self.gives_way
-        if uses and self.capacitance(clamped=True) <= 0.0:
-            least = self.permittivity * (1.0 - self.capacitance(clamped=True) / self.capacitance())
-            raise ValueError(
-                f"expected a permittivity above {least:.4g} F/m, the square of the piezoelectric constant times the"
-                f" modulus, which leaves the energy positive, found {self.permittivity:g}"
-            )
-
     def capacitance(self, *, clamped: bool = False) -> float:
-        """Return the capacitance of one patch with all layers and faces, F: free, or clamped."""
+        """Return the capacitance of one patch with all layers and faces, F: free to strain, or clamped."""
         field = 1.0 / ((self.fibre_angle is not None and self.electrode_spacing) or self.thickness)
         volume = self.length * self.width * self.thickness * self.layers * (2 if self.face == "both" else 1)
         return volume * (self.permittivity * field**2 - (self.lamina.energy if clamped else 0.0))
 
     def read_capacitance(self, yielding: Array) -> Array:
-        """Return the capacitances (k,) of patches as sensors, F.
+        """Return the capacitances (k,) of patches as sensors, F: free ones, those with open electrodes clamped.
 
-        With open electrodes, which no charge reaches, they are clamped, but for the strains that modes lack: `yielding`
-        (k,), F, as in `Effects`. Else they are free.
+        The latter yield to strains that modes lack by `yielding` (k,), F, as in `Effects`.
         """
         is_open = self.electrodes == "open"
         return self.capacitance(clamped=is_open) + is_open * yielding
 
     def amplifiers(self) -> Amplifiers:
-        """Return the amplifiers of all patches."""
+        """Return the amplifiers of all k patches, with their hysteresis."""
         of, k = self.amplifier or Amplifier(), self.patch_count
 
         def each(value: float | tuple[float, ...] | None) -> Array:
@@ -206,8 +310,13 @@ class PztLayout(Record):
 
     def with_one_limit(self, **changes: object) -> Self:
         """Return a changed copy with one limit for all patches, whose number may change."""
-        limit = min(self.limit) if isinstance(self.limit, tuple) else self.limit
-        of_all = {"limit": limit, "amplifier": self.amplifier and self.amplifier.for_any()}
+        of_all: dict[str, object] = {"limit": min(self.limit) if isinstance(self.limit, tuple) else self.limit}
+        if (of := self.amplifier) is not None:
+            least = {key: float(np.min(getattr(of, key))) for key, _ in of.lists() if key not in ("range", "delay")}
+            lowest = np.reshape(() if of.range is None else of.range, (-1, 2))
+            range = (float(lowest[:, 0].max()), float(lowest[:, 1].min())) if len(lowest) else None
+            least_all = {**least, "range": range, "delay": float(np.max(of.delay))}
+            of_all["amplifier"] = of.model_copy(update=least_all)
         return self.model_copy(update={**of_all, "allocation": "least-squares", **changes})
 
     def _check_plain(self) -> None:
@@ -224,7 +333,7 @@ class PztLayout(Record):
             )
 
     def _check_electrodes(self) -> None:
-        """Raise `ValueError` for voltages on patches that have none of an amplifier, and for patches in the air."""
+        """Raise `ValueError` for keys that patches which no voltage drives cannot have."""
         if self.shunt is not None and "electrodes" in self.model_fields_set:
             raise ValueError(f'expected a shunt in the place of electrodes = "{self.electrodes}", found both')
         if self.is_driven:
@@ -266,22 +375,17 @@ class PztLayout(Record):
         return self.body if self.name is None else self.name
 
     @property
-    def acts_in(self) -> Bends:
-        """Kind of deformation that the patches cause."""
-        return self.bends
-
-    @property
     def normal(self) -> Literal["y", "z"]:
         """Axis of the link along the normal of the patches' faces."""
         return "z" if self.bends == "out-of-plane" or self.face in ("+z", "-z") else "y"
 
     @property
     def lamina(self) -> Lamina:
-        """One layer by itself."""
+        """Elastic and piezoelectric constants of one layer."""
         if self.fibre_angle is None:
             held = self.strain == "biaxial" and self.coupling == "rotation"
             return plain_lamina(self.modulus, self.d31, self.thickness, self.poissons_ratio, held=held)
-        fibres = Fibres(
+        return fibre_lamina(
             E_1=self.modulus,
             E_2=self.modulus_across or 0.0,
             G_12=self.shear_modulus or 0.0,
@@ -291,7 +395,6 @@ class PztLayout(Record):
             angle=self.fibre_angle,
             spacing=self.electrode_spacing or self.thickness,
         )
-        return fibre_lamina(fibres)
 
     @property
     def is_driven(self) -> bool:
@@ -306,12 +409,12 @@ class PztLayout(Record):
     @property
     def adds_mass(self) -> bool:
         """Whether the mass of the patches is part of the link."""
-        return self.structural is True or (not isinstance(self.structural, bool) and "mass" in self.structural)
+        return self.structural is True or "mass" in (self.structural or ())
 
     @property
     def adds_stiffness(self) -> bool:
-        """Whether their stiffness is."""
-        return self.structural is True or (not isinstance(self.structural, bool) and "stiffness" in self.structural)
+        """Whether the stiffness of the patches is part of the link."""
+        return self.structural is True or "stiffness" in (self.structural or ())
 
     @property
     def patch_count(self) -> int:
@@ -324,10 +427,6 @@ class PztLayout(Record):
         yield Reference("body", self.body, "flexible body")
         for point in self.point_weights or ():
             yield Reference("point_weights", f"{self.body}.{point}")
-
-
-def _toml(value: bool | tuple[str, ...]) -> str:
-    return "true" if value is True else json.dumps(list(value or ()))
 
 
 def by_body(layouts: Sequence[PztLayout]) -> Iterator[tuple[str, list[PztLayout]]]:

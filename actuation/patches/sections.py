@@ -1,21 +1,18 @@
-"""The bare sections of a link under patches: extents, rigidities, and how twist shears their surface.
+"""The bare sections of a link under patches, and the loads of layers on them.
 
-The layers of a patch by themselves: where they are on a section, and what a volt and the section's strains do.
-
-Layers at the distance η from the axis, on faces with the outward sign s, strain as the section does,
+Layers at the distance η from the axis strain as the section does,
 
     ε = u' − η κ − ζ κ_t,    γ = β |η| φ_x'
 
-with the curvatures κ towards their normal and κ_t across it, ζ across the width and β of
-`sections.LinkSections.shear_lever`, and take C (ε, γ) − C Λ V (`lamina`). By virtual work their loads on the section
-are ∫ Bᵀ (C Λ V − C B e) dA with the rows B of these strains.
-Faces are driven against each other to bend, alike to twist.
+with the curvatures κ towards their normal and κ_t across it, ζ across the width and β of `LinkSections.shear_lever`,
+and have the stress C (ε, γ) − C Λ V (`Lamina`). By virtual work their loads on the section are ∫ Bᵀ (C Λ V − C B e) dA
+with the rows B of these strains. Voltages on both faces are opposite to bend, and alike to twist.
 """
 
 from __future__ import annotations
 
 from functools import cached_property, lru_cache
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
@@ -29,13 +26,12 @@ from .records import PztLayout
 BEND_Y, STRETCH, TWIST, BEND_Z = range(4)
 """Strains of a section, e = (φ_z', u', φ_x', −φ_y'): curvature towards y, stretch, twist, curvature towards z."""
 
-KEPT = 4  # links of which sections are remembered
 ROUND = 1e-6  # of the radius: corners of an outline that are so far from the axis are on a circle
 
 
 @struct
 class LinkSections:
-    """Section properties from each of k stations on; NaN if unknown."""
+    """Section properties of a link from each of its k stations on; NaN if unknown."""
 
     x: Array  # (k,) m
     # height, width: (k,) along y and z, m
@@ -46,29 +42,34 @@ class LinkSections:
     middle: Array  # (k, 2) between the faces along y and z, from the axis, m
 
     def extent(self, normal: Literal["y", "z"], side: float = 0.0) -> Array:
-        """Return the extent (k,) along that normal, m; for `side` ±1, twice the distance of that face from the axis."""
+        """Return extents (k,) along a normal, m; for `side` ±1, twice the distance of that face from the axis."""
         between, axis = (self.height, 0) if normal == "y" else (self.width, 1)
         return between + 2 * side * self.middle[:, axis]
 
     @cached_property
     def alike(self) -> Indices:
-        """Indices (k,) of the first station with the same section."""
+        """Indices (k,) of the first station with the same section as each."""
         of_station = np.column_stack([self.height, self.width, self.is_round, self.rigidity, self.middle])
         _, first, same = np.unique(of_station, axis=0, return_index=True, return_inverse=True)
         return first[same.ravel()]
 
     def shear_lever(self, station: int, normal: Literal["y", "z"], patch_width: float) -> float:
-        """β: mean shear of the surface under a patch, of unit twist, over its distance from the axis.
+        """Return β: mean shear of the surface under a patch by unit twist, over its distance from the axis.
 
         1 of round sections (γ = r φ'), 2 of thin strips (γ = 2 d φ', plates), St Venant's of other rectangles.
+        `patch_width` in m.
         """
         if self.is_round[station]:
             return 1.0
         high, wide = self.height[station], self.width[station]
-        return _lever_of_rectangle(*((high, wide) if normal == "y" else (wide, high)), patch_width)
+        extent, across = (high, wide) if normal == "y" else (wide, high)
+        return _surface_shear(extent, across, min(patch_width, across)) / (extent / 2)
 
 
-@lru_cache(maxsize=KEPT)
+_surface_shear = lru_cache(surface_shear)  # a series, asked for at each station
+
+
+@lru_cache(maxsize=4)
 def link_sections(body: ModalBody) -> LinkSections:
     """Return the section properties of a modal body."""
     stations = body.stations
@@ -125,25 +126,16 @@ def check_width(key: str, body: ModalBody, layout: PztLayout, edges: Array) -> N
 
 
 def potentials(body: ModalBody, x: Array) -> Array:
-    """Return (m, 4, n) at x (m,) whose differences are integrals of the strains e along x: φ_z, u, φ_x, −φ_y."""
+    """Return φ_z, u, φ_x, −φ_y (m, 4, n) of n modes at x (m,), m: rad and m per unit of each.
+
+    Their differences are the integrals of the strains e along x.
+    """
     _, translation, rotation = body.along_axis(x)
     return np.stack([rotation[:, 2], translation[:, 0], rotation[:, 0], -rotation[:, 1]], axis=1)
 
 
-@lru_cache
-def _lever_of_rectangle(extent: float, across: float, patch_width: float) -> float:
-    return surface_shear(extent, across, min(patch_width, across)) / (extent / 2)
-
-
-class LayerLoads(NamedTuple):
-    """Loads P = f V − C e on a section, N·m and N, by its strains e = (φ_z', u', φ_x', −φ_y'): C (4, 4), f (4,)."""
-
-    C: Array
-    f: Array
-
-
 def side(layout: PztLayout) -> float:
-    """1.0 of patches on the face at largest y (or z), -1.0 at smallest, 0.0 of those on both or on no named face."""
+    """Return 1.0 of patches on the face at largest y (or z), -1.0 at smallest, 0.0 on both faces or no named one."""
     return {"+": 1.0, "-": -1.0}.get((layout.face or " ")[0], 0.0)
 
 
@@ -153,8 +145,8 @@ def bending_row(layout: PztLayout) -> int:
 
 
 def own_row(layout: PztLayout) -> int:
-    """Index of the strain e that the layout actuates."""
-    return TWIST if layout.acts_in == "twist" else bending_row(layout)
+    """Return the index of the strain e that the layout actuates."""
+    return TWIST if layout.bends == "twist" else bending_row(layout)
 
 
 def across_row(layout: PztLayout) -> int:
@@ -172,7 +164,7 @@ def felt_rows(layout: PztLayout) -> Indices:
 def layer_section(layout: PztLayout, extent: float) -> tuple[float, float, float]:
     """Return (A, S, I) = w ∫ (1, η, η²) dη over all layers, m², m³, m⁴; η from the link's axis.
 
-    On a link of that extent t_b (m) along their normal; those without a named face lie on one.
+    For a link of that `extent` t_b (m) along their normal; layers without a named face lie on one.
     """
     w, t = layout.width, layout.layers * layout.thickness
     inner, outer = extent / 2, extent / 2 + t
@@ -181,8 +173,13 @@ def layer_section(layout: PztLayout, extent: float) -> tuple[float, float, float
     return faces * w * t, sign * w * (outer**2 - inner**2) / 2, faces * w * (outer**3 - inner**3) / 3
 
 
-def layer_loads(layout: PztLayout, extent: float, lever: float) -> LayerLoads:
-    """Return loads of all layers on their strains, for a link `extent` (m) along their normal; `lever` is β."""
+def layer_loads(layout: PztLayout, extent: float, lever: float) -> tuple[Array, Array]:
+    """Return C (4, 4) and f (4,) of the loads P = f V − C e of all layers on a section, N·m and N, by its strains e.
+
+    For a link `extent` (m) along their normal; `lever` is β. Along the strain that they actuate, f of plain ceramic on
+    one face is E_p d31 w_p N (t_b + N t_p)/2 N·m/V: the layers' arms, t_b/2 + (i − ½) t_p, are summed (one: Eq. 14 of
+    Shabana 2022). Both faces double it; twist has the shear force per width of a volt, times β, in place of E_p d31.
+    """
     A, S, I = layer_section(layout, extent)  # noqa: E741
     sign, middle, w = np.sign(S), layout.offset, layout.width
     arm = A * (extent + layout.layers * layout.thickness) / 2  # ∫ |η| dA
@@ -196,26 +193,16 @@ def layer_loads(layout: PztLayout, extent: float, lever: float) -> LayerLoads:
     C[np.ix_(axial, axial)] = E * area
     C[axial, TWIST] = C[TWIST, axial] = D * lever * at_arm
     C[TWIST, TWIST] = G * lever**2 * I
-    if layout.acts_in == "twist":
+    if layout.bends == "twist":
         f[axial], f[TWIST] = n_x * area[0], n_s * lever * arm
     else:
         f[axial], f[TWIST] = n_x * np.array([-sign * A, arm, sign * A * middle]), -sign * n_s * lever * arm
-    return LayerLoads(C, f)
+    return C, f
 
 
 def straight_loads(layout: PztLayout, extent: float, lever: float) -> Array:
-    """Return `f` (4,) of `layer_loads` on a straight link; 0 along strains that do not interact with patches."""
-    found, rows = np.zeros(4), felt_rows(layout)
-    found[rows] = layer_loads(layout, extent, lever).f[rows]
-    return found
-
-
-def load_per_volt(layout: PztLayout, extent: Array, lever: Array) -> Array:
-    """Moment (k,) per volt, N·m/V, of patches on a link held straight; see `composite` for the layers' stiffness.
-
-    Of bending, E_p d31 w_p N (t_b + N t_p)/2 of N layers on one face, twice that on both: the layers' arms,
-    t_b/2 + (i − ½) t_p, are summed. One layer on one face is Eq. 14 of Shabana 2022. Of twist, the shear force per
-    width of a volt instead of E_p d31, times β.
-    """
-    row = own_row(layout)
-    return np.array([layer_loads(layout, *place).f[row] for place in zip(extent, lever, strict=True)])
+    """Return f (4,), N·m/V and N/V, of `layer_loads`, 0 along strains that do not interact with the patches."""
+    f = np.zeros(4)
+    rows = felt_rows(layout)
+    f[rows] = layer_loads(layout, extent, lever)[1][rows]
+    return f

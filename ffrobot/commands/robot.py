@@ -127,8 +127,7 @@ def fit(
 
         print_fit(fit_measured(file, measured, keys, output, motors=motors, force=force), console)
     else:
-        from ..fit.frf import fit_responses, print_responses
-        from ..fit.frf_picture import draw_responses
+        from ..fit.frf import draw_responses, fit_responses, print_responses
 
         fitted = fit_responses(file, table, keys, output, motors=motors or "locked", force=force)
         print_responses(fitted, console)

@@ -1,4 +1,4 @@
-"""Covariance of fitted parameters in a file, and what it makes of stable depths of cut over a map."""
+"""Covariance of fitted parameters in a file, and deviations of stable depths of cut over a map by it."""
 
 from __future__ import annotations
 
@@ -25,11 +25,6 @@ from ..run.prepare import prepare_scene
 from .fitting import RobotTarget, VariedKeys
 from .least_squares import Parameters
 
-DEPTH, DEVIATION = "milling_depth", "milling_deviation"
-ROUND_OFF = 1e-9  # of correlations, below which an eigenvalue is 0
-
-INEXACT = 1e-3  # of correlations: round-off of a fit with keys that hardly differ, or few digits
-
 
 class Covariance(Record):
     """Errors of fitted parameters, relative to them."""
@@ -47,7 +42,8 @@ class Covariance(Record):
         if sizes != {len(self.keys)}:
             raise ValueError(f"expected a deviation and a list of correlations for each of {len(self.keys)} keys")
         R = np.array(self.correlation)
-        if np.abs(np.append(R - R.T, R.diagonal() - 1.0)).max() > INEXACT:
+        # keys that hardly differ, or few digits, leave as much round-off
+        if np.abs(np.append(R - R.T, R.diagonal() - 1.0)).max() > 1e-3:
             raise ValueError("correlation: expected a symmetric matrix with 1 on its diagonal, found another")
         return self
 
@@ -55,7 +51,7 @@ class Covariance(Record):
     def steps(self) -> Array:
         """Independent changes (k, n) of ln θ of one standard deviation each: Σ step stepᵀ is the covariance."""
         values, vectors = np.linalg.eigh(np.array(self.correlation))
-        if values[0] < -ROUND_OFF * len(values):
+        if values[0] < -1e-9 * len(values):
             raise InputError("correlation: expected one without negative eigenvalues", "others")
         return as_floats((vectors * np.sqrt(values.clip(min=0.0))).T * np.array(self.deviation))
 
@@ -71,12 +67,12 @@ def write_covariance(fit: Parameters, path: Path) -> None:
 
 
 def read_covariance(path: Path) -> Covariance:
-    """The covariance in the TOML file at `path`. Raises `InputError` for wrong keys."""
+    """Read the covariance in the TOML file at `path`. Raises `InputError` for wrong keys."""
     return validate(Covariance, load_toml(path, "covariance of a fit"), path)
 
 
 def with_deviations(poses: PoseMap, covariance: Covariance) -> PoseMap:
-    """The map of stable depths with `milling_deviation` (P,), m: standard deviations of `milling_depth`.
+    """Return the map of stable depths with `milling_deviation` (P,), m: standard deviations of `milling_depth`.
 
     σ² = Σ ((a₊ − a₋)/2)² over independent changes of one standard deviation of the parameters to both sides; NaN where
     a changed robot has no equilibrium, or no limit. Raises `InputError` for keys that the scene has not.
@@ -88,7 +84,7 @@ def with_deviations(poses: PoseMap, covariance: Covariance) -> PoseMap:
         for name, depth in ahead.items():
             with np.errstate(invalid="ignore"):
                 variances[name] = variances.get(name, 0.0) + ((depth - behind[name]) / 2) ** 2
-    named = {name.replace(DEPTH, DEVIATION): np.sqrt(values) for name, values in variances.items()}
+    named = {name.replace("_depth", "_deviation"): np.sqrt(values) for name, values in variances.items()}
     return replace(poses, values={**poses.values, **named})
 
 
@@ -96,7 +92,7 @@ def _depths(poses: PoseMap, target: RobotTarget, varied: VariedKeys, values: Arr
     """Stable depths (P,) in all poses with other values of the parameters, by name; NaN where there are none."""
     with varied.named(values):
         model = prepare_scene(target.scene(varied.changes(values), "static")).model
-    depths = {name: np.full(len(poses.q), np.nan) for name in poses.values if name.endswith(f"/{DEPTH}")}
+    depths = {name: np.full(len(poses.q), np.nan) for name in poses.values if name.endswith("/milling_depth")}
     good, milling = np.flatnonzero(poses.status == 0), poses.plan.milling
     judge = None if milling is None else partial(stable_depths, milling.model_copy(update={"speeds": ()}))
     evaluator = PoseEvaluator(model, poses.q[good[0]], poses.plan.point, judge=judge)

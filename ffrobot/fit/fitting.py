@@ -25,7 +25,7 @@ from ..common.toml_files import load_toml, read_text
 from ..common.validation import check_texts
 from ..fe_models.link import computed_modal_body
 from ..fe_models.link_records.families import FAMILIES
-from ..fe_models.link_records.measured import MeasuredMode, paired, read_measured
+from ..fe_models.link_records.measured import paired, read_measured
 from ..fe_models.link_source import LinkTable
 from ..present.lines import print_table
 from ..run.solve import solve_scene
@@ -41,30 +41,27 @@ VALUE = r'("[^"\n]*"|[^\s,}\]#]+)'  # a text or a number
 
 
 def with_values(text: str, changes: Mapping[Key, float | str]) -> str:
-    """The TOML `text` with other values of keys that are in it.
+    """Return the TOML `text` with other values of keys that are in it.
 
-    A value is replaced where it stands, which parsing the outcome proves; where no such place is found, as of an entry
+    A value is replaced where it stands, which parsing the result confirms; where there is no such place, as of an entry
     of a list, the tables are written anew, without comments.
     """
     for key, value in changes.items():
         wanted = deepcopy(tomllib.loads(text))
         set_key(wanted, key, value)
-        text = _edited(text, key[-1], json.dumps(value, ensure_ascii=False), wanted) or tomli_w.dumps(wanted)
+        new, old = json.dumps(value, ensure_ascii=False), text
+        for match in re.finditer(rf"(?<![\w.-]){re.escape(key[-1])}\s*=\s*{VALUE}", old):
+            text = old[: match.start(1)] + new + old[match.end(1) :]
+            with suppress(tomllib.TOMLDecodeError):
+                if tomllib.loads(text) == wanted:
+                    break
+        else:
+            text = tomli_w.dumps(wanted)
     return text
 
 
-def _edited(text: str, name: str, value: str, wanted: Mapping[str, object]) -> str:
-    """The text with one entry `name = …` replaced such that it says what is `wanted`; empty where none does."""
-    for match in re.finditer(rf"(?<![\w.-]){re.escape(name)}\s*=\s*{VALUE}", text):
-        edited = text[: match.start(1)] + value + text[match.end(1) :]
-        with suppress(tomllib.TOMLDecodeError):
-            if tomllib.loads(edited) == wanted:
-                return edited
-    return ""
-
-
 class LinkTarget:
-    """The link file at `path`: its eigenmodes under its reference condition."""
+    """Eigenmodes of the link file at `path` under its reference condition."""
 
     families: tuple[str, ...] = FAMILIES
 
@@ -77,7 +74,7 @@ class LinkTarget:
         return value_of(self._tables, key)
 
     def modes(self, changes: dict[Key, float]) -> tuple[tuple[str, ...], Array]:
-        """Families and frequencies (Hz) of the eigenmodes, the lowest first, with some values changed."""
+        """Return families and frequencies (k,), Hz, of the eigenmodes, the lowest first, with some values changed."""
         tables = deepcopy(self._tables)
         for key, value in changes.items():
             set_key(tables, key, value)
@@ -85,7 +82,7 @@ class LinkTarget:
         return body.family[: body.eigenmode_count], body.frequency[: body.eigenmode_count]
 
     def files(self, changes: dict[Key, float], output: Path | None) -> dict[Path, str]:
-        """Texts of the new link files, by path."""
+        """Return the text of the new link file, by path."""
         return {_beside(self._path, output): with_values(read_text(self._path, "link file"), dict(changes))}
 
 
@@ -101,7 +98,7 @@ def _beside(path: Path, output: Path | None) -> Path:
 
 
 class RobotTarget:
-    """The scene at `path`: vibrations about the equilibrium at t = 0, with `motors` "free" or "locked"."""
+    """Vibrations of the scene at `path` about the equilibrium at t = 0, with `motors` "free" or "locked"."""
 
     families: tuple[str, ...] = ()
 
@@ -121,9 +118,9 @@ class RobotTarget:
         return value_of(self._tables, key[1:]) if len(key) > 2 else None
 
     def scene(self, changes: Mapping[Key, float], kind: str, initial: Mapping[str, object] | None = None) -> Scene:
-        """The scene with some values changed, one analysis of a `kind`, and other entries of [initial].
+        """Return the scene with some values changed, one analysis of a `kind`, and other entries of [initial].
 
-        Raises `InputError`.
+        Raises `InputError` for values that it does not allow.
         """
         files = run_files(self._path, changes, self._path.parent)
         scene = files.scene | {"analysis": [{"name": "fit", "kind": kind}]}
@@ -138,7 +135,7 @@ class RobotTarget:
         return make_scene(folder=self._path.parent, **scene)
 
     def modes(self, changes: dict[Key, float]) -> tuple[tuple[str, ...], Array]:
-        """Frequencies (Hz) of the robot's vibrations, the lowest first, with some values changed; no families."""
+        """Return frequencies (k,), Hz, of the robot's vibrations, the lowest first, by other values; no families."""
         solution = solve_scene(self.scene(changes, "linear"), Watcher())
         details = solution.outcomes["fit"].details
         assert isinstance(details, LinearModels)
@@ -147,7 +144,7 @@ class RobotTarget:
         return ("",) * len(frequency), frequency
 
     def files(self, changes: dict[Key, float], output: Path | None) -> dict[Path, str]:
-        """The text of the new scene file and of the link files that change, by where they go."""
+        """Return the texts of the new scene file and of the link files that change, by path."""
         path = _beside(self._path, output)
         of_scene: dict[Key, float | str] = {}
         of_links: dict[str, dict[Key, float | str]] = {}
@@ -167,8 +164,6 @@ class RobotTarget:
             of_scene["body", body, "link"] = Path(link).with_name(new.name).as_posix()
         return texts | {path: with_values(read_text(self._path, "scene file"), of_scene)}
 
-
-DIGITS = 8  # of fitted values in files: more than measured ones have
 
 Motors = Literal["free", "locked"]
 
@@ -205,19 +200,32 @@ def fit_measured(
     """
     check_texts(vary, "fit_measured: vary")
     path, table = Path(file), Path(measured)
-    varied = VariedKeys(path, _target(path, motors), vary, output)
-    target = varied.target
+    is_link = "geometry" in load_toml(path, "link or scene file")
+    if is_link and motors is not None:
+        raise InputError(f"{path}: --motors: expected a scene file next to it", "a link file")
+    target: LinkTarget | RobotTarget = LinkTarget(path) if is_link else RobotTarget(path, motors or "free")
+    varied = VariedKeys(path, target, vary, output)
     rows = [row for row in read_measured(table, target.families) if row.frequency is not None]
 
     def frequencies(values: Array) -> Array:
         with varied.named(values):
             family, frequency = target.modes(varied.changes(values))
-        return _of_rows(table, rows, family, frequency)
+        places = {row: k for k, row in paired(rows, family)}
+        for row in rows:
+            if row not in places:
+                raise InputError(
+                    f"{table}: line {row.line}: expected modes that the model has ({len(family)} of them)", row.label
+                )
+        return as_floats(frequency[[places[row] for row in rows]])
 
     varied.check_new(replace=force)  # before any work is done
     measured_at = np.array([row.frequency for row in rows], dtype=np.float64)
+    spread = [row.uncertainty for row in rows if row.uncertainty is not None]
+    if spread and len(spread) < len(rows):
+        raise InputError(f"{table}: uncertainty: expected it of all frequencies or of none", len(spread))
+    uncertainty = np.array(spread) if spread else None
     labels = [row.label for row in rows]
-    fit = fit_frequencies(frequencies, varied.names, varied.start, labels, measured_at, _uncertainty(table, rows))
+    fit = fit_frequencies(frequencies, varied.names, varied.start, labels, measured_at, uncertainty)
     return replace(fit, files=varied.write(fit.value))
 
 
@@ -225,7 +233,8 @@ class VariedKeys:
     """Keys of a link or scene file that `--vary` names; those of one text, "KEY=KEY", have a common factor.
 
     Attributes:
-        names, start: of the texts, and values (n,) of their first keys in the file.
+        names: the texts.
+        start: (n,) values of their first keys in the file.
     """
 
     def __init__(
@@ -237,19 +246,25 @@ class VariedKeys:
         keys = [key for group in self._groups for key in group]
         if twice := {".".join(key) for key in keys if keys.count(key) > 1}:
             raise InputError("--vary: expected each key once", f"{quoted(sorted(twice))} again")
-        self._starts = {key: _start(path, target, key) for key in keys}
+        self._starts: dict[Key, float] = {}
+        for key in keys:
+            value = target.start(key)
+            if isinstance(value, bool) or not isinstance(value, int | float) or value <= 0:
+                text = "none" if value is None else repr(value)
+                raise InputError(f"{path}: --vary: expected a number above 0 at {'.'.join(key)}", text)
+            self._starts[key] = float(value)
         self.names = ["=".join(".".join(key) for key in group) for group in self._groups]
         self.start = np.array([self._starts[group[0]] for group in self._groups])
 
     def changes(self, values: Array) -> dict[Key, float]:
-        """Values of all keys from those (n,) of the parameters."""
+        """Return the values of all keys from those (n,) of the parameters."""
         factors = values / self.start
         pairs = zip(self._groups, factors, strict=True)
         return {key: float(self._starts[key] * c) for group, c in pairs for key in group}
 
     @contextmanager
     def named(self, values: Array) -> Iterator[None]:
-        """Context that puts the values (n,) on errors of a model with them."""
+        """Context that adds the values (n,) of the parameters to errors of a model with them."""
         try:
             yield
         except FfrobotError as error:
@@ -267,48 +282,12 @@ class VariedKeys:
             check_new_file(new, replace=replace)
 
     def write(self, values: Array) -> tuple[str, ...]:
-        """Write files with the values (n,) of the parameters, and return their paths."""
-        fitted = {key: float(f"{value:.{DIGITS}g}") for key, value in self.changes(values).items()}
+        """Write files with the values (n,) of the parameters, to 8 digits, and return their paths."""
+        fitted = {key: float(f"{value:.8g}") for key, value in self.changes(values).items()}
         texts = self.target.files(fitted, self._place)
         for new, text in texts.items():
             write_atomically(new, text.encode(), "fitted file")
         return tuple(map(str, texts))
-
-
-def _target(path: Path, motors: Motors | None) -> LinkTarget | RobotTarget:
-    tables = load_toml(path, "link or scene file")
-    if "geometry" not in tables:
-        return RobotTarget(path, motors or "free")
-    if motors is not None:
-        raise InputError(f"{path}: --motors: expected a scene file next to it", "a link file")
-    return LinkTarget(path)
-
-
-def _start(path: Path, target: LinkTarget | RobotTarget, key: Key) -> float:
-    value = target.start(key)
-    if isinstance(value, bool) or not isinstance(value, int | float) or value <= 0:
-        text = "none" if value is None else repr(value)
-        raise InputError(f"{path}: --vary: expected a number above 0 at {'.'.join(key)}", text)
-    return float(value)
-
-
-def _of_rows(path: Path, rows: Sequence[MeasuredMode], family: tuple[str, ...], frequency: Array) -> Array:
-    """The frequencies (m,) that belong to the rows."""
-    places = {row: k for k, row in paired(list(rows), family)}
-    for row in rows:
-        if row not in places:
-            raise InputError(
-                f"{path}: line {row.line}: expected modes that the model has ({len(family)} of them)", row.label
-            )
-    return as_floats(frequency[[places[row] for row in rows]])
-
-
-def _uncertainty(path: Path, rows: Sequence[MeasuredMode]) -> Array | None:
-    """(m,) Hz, where the table has them."""
-    given = [row.uncertainty for row in rows if row.uncertainty is not None]
-    if given and len(given) < len(rows):
-        raise InputError(f"{path}: uncertainty: expected it of all frequencies or of none", len(given))
-    return np.array(given) if given else None
 
 
 FEW = 30  # degrees of freedom below which two standard deviations are less than a range of 95 %
@@ -316,7 +295,7 @@ ALIKE = 0.95  # correlation of two parameters' errors from which their values ar
 
 
 def print_fit(fit: Fit, console: Console) -> None:
-    """Tables of parameters and modes, remarks, and the files written."""
+    """Print tables of parameters and modes, remarks, and the files written."""
     print_parameters(fit, console)
     modes = (
         (label, *(f"{frequency:.6g}" for frequency in frequencies), f"{100 * error:+.3f} %")
@@ -328,7 +307,7 @@ def print_fit(fit: Fit, console: Console) -> None:
 
 
 def print_parameters(fit: Parameters, console: Console) -> None:
-    """A table of the parameters."""
+    """Print a table of the parameters."""
     rows = (
         (key, f"{start:.6g}", f"{value:.6g}",
          "not known" if np.isnan(spread) else f"{spread * value:.2g} ({100 * spread:.2g} %)")
@@ -338,7 +317,7 @@ def print_parameters(fit: Parameters, console: Console) -> None:
 
 
 def remarks(fit: Fit) -> Iterator[str]:
-    """Notes on the accuracy of the fit."""
+    """Yield notes on the accuracy of the fit."""
     if np.isnan(fit.relative_deviation).any():
         yield (
             "as many frequencies as keys: they fit whatever their errors, so no uncertainty is known; give a column"
@@ -360,7 +339,7 @@ def remarks(fit: Fit) -> Iterator[str]:
 
 
 def correlated(fit: Parameters) -> Iterator[str]:
-    """Notes on pairs of parameters that are hardly distinguishable."""
+    """Yield notes on pairs of parameters that are hardly distinguishable."""
     for i, j in zip(*np.triu_indices(len(fit.keys), 1), strict=True):
         if abs(fit.correlation[i, j]) > ALIKE:
             yield (

@@ -1,26 +1,44 @@
-"""`ffrobot fit --frf`: keys of a scene fitted to frequency response functions in one or several poses."""
+"""`ffrobot fit --frf`: keys of a scene fitted to frequency response functions in one or several poses.
+
+Residuals are ln(H/H_measured)/σ of each line, the logarithm of the magnitude and the phase (rad). The equations of the
+robot are taken as linear in the parameters θ from one place to the next, where they are made anew: they are linear in
+stiffness, damping and masses but for what gravity adds, so that a few places are enough.
+
+With Z = K + iωD − ω²M and rows J of the points' displacements, the receptance is H = J_r Z⁻¹ J_fᵀ, and
+
+    dH = dJ_r X + Yᵀ dJ_fᵀ − Yᵀ dZ X,      X = Z⁻¹ J_fᵀ,  Y = Z⁻ᵀ J_rᵀ.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+import io
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
 from rich.console import Console
 
-from ..common.arrays import Array
-from ..common.errors import InputError
-from ..common.files import AnyPath, check_new_file
+from ..common.arrays import Array, ComplexArray, as_floats
+from ..common.errors import InputError, SolveError
+from ..common.files import AnyPath, check_new_file, write_atomically
+from ..common.libraries import scipy
 from ..common.toml_files import load_toml
 from ..common.validation import check_texts
+from ..map.pose_map import check_point
+from ..mbs.linear.joint_conditions import COMPLIANT, free_coordinates, vibration
+from ..mbs.linear.poses import PoseEvaluator
+from ..mbs.posture.start import undeformed_posture
 from ..mbs.scene.mechanism import Initial
+from ..mbs.scene.space import SPACES
 from ..present.lines import print_table
-from ..run.prepare import prepare_scene
+from ..run.prepare import prepare_scene, unsolved
+from ..run.result import Solution
 from .covariance import write_covariance
 from .fitting import Motors, RobotTarget, VariedKeys, correlated, print_parameters
-from .frf_fit import PoseComparison, PoseModel, ResponseFit, fit_receptances
 from .frf_measured import MeasuredPose, read_tests
+from .least_squares import MOST_EVALUATIONS, Parameters, check_distinguishable, uncertainty_of
 
 UNSEEN = 0.5  # relative deviation of a parameter from which the tests hardly see it
 POOR = 0.8  # FRAC of an FRF that the model hardly has
@@ -80,7 +98,7 @@ def fit_responses(
 
 
 def _start(tests: Path, target: RobotTarget, pose: MeasuredPose) -> Initial | None:
-    """The [initial] of a pose; None for that of the scene. Raises `InputError` with the name of the test."""
+    """The [initial] of a pose; None for that of the scene."""
     if not pose.test.pose:
         return None
     try:
@@ -90,27 +108,23 @@ def _start(tests: Path, target: RobotTarget, pose: MeasuredPose) -> Initial | No
 
 
 def print_responses(fit: ResponseFit, console: Console) -> None:
-    """Tables of parameters and poses, remarks, and the files written."""
+    """Print tables of parameters and poses, remarks, and the files written."""
     print_parameters(fit, console)
+    rows = []
+    for one in fit.poses:
+        errors, frac = one.frequency_error, one.frac
+        peaks = f"{100 * errors[np.abs(errors).argmax()]:+.2f} % of {len(errors)}" if len(errors) else "none"
+        use = "validation" if one.pose.test.validation else "fit"
+        of_frac = str(len(frac)), f"{frac.min():.4f}", f"{frac.mean():.4f}"
+        rows.append((one.pose.test.name, use, *of_frac, peaks, f"{100 * one.misfit:.2g} %"))
     heading = ("test", "used for", "FRFs", "least FRAC", "mean FRAC", "peaks: largest error", "misfit")
-    print_table(console, heading, map(_row, fit.poses))
+    print_table(console, heading, rows)
     for line in (*remarks(fit), *(f"written: {path}" for path in fit.files)):
         console.print(line, soft_wrap=True)
 
 
-def _row(one: PoseComparison) -> tuple[str, ...]:
-    errors = one.frequency_error
-    peaks = f"{100 * errors[np.abs(errors).argmax()]:+.2f} % of {len(errors)}" if len(errors) else "none"
-    use = "validation" if one.pose.test.validation else "fit"
-    frac = one.frac
-    return (
-        one.pose.test.name, use, str(len(frac)), f"{frac.min():.4f}", f"{frac.mean():.4f}", peaks,
-        f"{100 * one.misfit:.2g} %",
-    )  # fmt: skip
-
-
 def remarks(fit: ResponseFit) -> Iterator[str]:
-    """Notes on what the tests say of the parameters, and on FRFs that the model lacks."""
+    """Yield notes on parameters with large deviations, and on FRFs that the model lacks."""
     for key, deviation in zip(fit.keys, fit.relative_deviation, strict=True):
         if deviation > UNSEEN:
             yield f"the tests hardly see {key}: its standard deviation is {100 * deviation:.2g} % of it"
@@ -119,3 +133,292 @@ def remarks(fit: ResponseFit) -> Iterator[str]:
         for response, frac in zip(one.pose.responses, one.frac, strict=True):
             if frac < POOR:
                 yield f'test "{one.pose.test.name}": {response.label}: FRAC {frac:.3f}: the model lacks something there'
+
+
+Equations = Callable[[Array], Sequence[Array]]
+"""`stacked` equations of all poses by the values (n,) of parameters, in the same coordinates for all of these."""
+
+
+def stacked(M: Array, K: Array, D: Array, J: Array) -> Array:
+    """Return one array (3 f + r, f) of M, K, D (f, f), SI units, and rows J (r, f) of `MeasuredPose.ends`."""
+    return np.vstack([M, K, D, J])
+
+
+def unstacked(equations: Array) -> list[Array]:
+    """Return M, K, D (f, f) and J (r, f) of `stacked` equations."""
+    f = equations.shape[1]
+    return np.split(equations, [f, 2 * f, 3 * f])
+
+
+def receptance(
+    equations: Array, pose: MeasuredPose, changes: Sequence[Array] = ()
+) -> tuple[ComplexArray, ComplexArray]:
+    """Return H (F, p), m/N, where a pose was measured, and its derivatives (n, F, p) along `changes` of `equations`."""
+    (M, K, D, J), f, r = unstacked(equations), pose.ends.force, pose.ends.response
+    X, w = vibration(M, K, D, J, pose.omega), pose.omega[:, None, None]
+    H: ComplexArray = np.asarray((J @ X)[:, r, f], dtype=complex)
+    slopes = np.empty((len(changes), *H.shape), dtype=complex)
+    if len(changes):
+        Y = vibration(M.T, K.T, D.T, J, pose.omega).swapaxes(1, 2)
+        for k, (dM, dK, dD, dJ) in enumerate(map(unstacked, changes)):
+            dX = dK @ X + 1j * w * (dD @ X) - w**2 * (dM @ X)
+            slopes[k] = (dJ @ X + Y @ dJ.T - Y @ dX)[:, r, f]
+    return H, slopes
+
+
+class PoseModel:
+    """Equations of a robot in the pose of a test, with the same coordinates for all parameters.
+
+    `initial`: the pose; None: the start of the scene. `motors`: "locked" or "free".
+    """
+
+    def __init__(self, pose: MeasuredPose, initial: Initial | None, motors: str) -> None:
+        self.pose, self._initial, self._motors = pose, initial, motors
+        self._free: Array | None = None
+        self._rest: Array | None = None  # the first equilibrium
+
+    def at(self, robot: Solution) -> Array:
+        """Return the `stacked` equations (3 f + r, f) about the equilibrium, SI units.
+
+        Raises `InputError` for unknown points, `SolveError` without an equilibrium.
+        """
+        if self._initial is not None:
+            change = {"initial": self._initial, "trajectory": ()}
+            robot = unsolved(replace(robot, scene=robot.scene.model_copy(update=change)))
+        q = undeformed_posture(robot.model).q
+        first, *others = dict.fromkeys(row.point for row in self.pose.ends.directions)
+        for point in (first, *others):
+            check_point(robot, point, f'test "{self.pose.test.name}"')
+        linear, rest = PoseEvaluator(robot.model, q, first, others=others).linear_equations(q, self._rest)
+        if self._free is None:
+            self._rest = rest
+            self._free = free_coordinates(linear, COMPLIANT).N if self._motors == "locked" else np.eye(len(linear.M))
+        N, d = self._free, len(SPACES[robot.model.scene.space].translations)
+        J = np.array([np.array(row.axis[:d]) @ linear.points[row.point][:d] for row in self.pose.ends.directions])
+        return stacked(N.T @ linear.M @ N, N.T @ linear.K @ N, N.T @ linear.D @ N, J @ N)
+
+
+STEP = 1e-4  # relative, for derivatives of the equations
+LINEAR = 1e-3  # relative: where the equations are off by more, their derivatives are made anew
+REACHED = 1e-9  # of ln θ: a last step
+MOST_PLACES = 30
+NO_EFFECT = 1e-9  # of a parameter at the start, against the largest: small damping has little there
+NO_MOTION = 1e-12  # of a measured FRF: the model has none
+STANDS_OUT = float(np.log(2.0))  # of peaks, in the logarithm of the magnitude
+SMOOTH = (0.3, 0.1, 0.03)  # of ln f: widths over which magnitudes are first compared, so that peaks find each other
+
+
+@dataclass(frozen=True)
+class PoseComparison:
+    """The FRFs (F, p) of a pose, m/N: measured, at the start, and fitted."""
+
+    pose: MeasuredPose
+    before: ComplexArray
+    after: ComplexArray
+
+    @property
+    def frac(self) -> Array:
+        """Frequency response assurance criteria (p,), 1 of equal shapes (Heylen and Avitabile, IMAC 1998)."""
+        a, b = self.pose.receptance, self.after
+        across = np.abs((a.conj() * b).sum(axis=0)) ** 2
+        return as_floats(across / ((np.abs(a) ** 2).sum(axis=0) * (np.abs(b) ** 2).sum(axis=0)))
+
+    @property
+    def frequency_error(self) -> Array:
+        """Relative errors (k,) of the frequencies of the k peaks of the measured sum of magnitudes."""
+        pairs = ((self.pose.receptance, STANDS_OUT), (self.after, 0.1 * STANDS_OUT))
+        measured, fitted = (_peaks(self.pose.frequency, *pair) for pair in pairs)
+        if not len(fitted):
+            return np.zeros(0)
+        return as_floats(np.array([fitted[np.abs(fitted / f - 1.0).argmin()] / f - 1.0 for f in measured]))
+
+    @property
+    def misfit(self) -> float:
+        """Root mean square of |ln(H/H_measured)|, about the relative error."""
+        return float(np.sqrt(np.mean(np.abs(np.log(self.after / self.pose.receptance)) ** 2)))
+
+
+def _peaks(frequency: Array, H: ComplexArray, prominence: float) -> Array:
+    """Frequencies of peaks that stand out by `prominence` of the logarithm, by the parabola through three points."""
+    size = np.log((np.abs(H) * frequency[:, None]).sum(axis=1))
+    at = scipy.signal.find_peaks(size, prominence=prominence)[0]
+    left, middle, right = size[at - 1], size[at], size[at + 1]
+    shift = 0.5 * (left - right) / (left - 2.0 * middle + right)
+    return as_floats(frequency[at] + shift * 0.5 * (frequency[at + 1] - frequency[at - 1]))
+
+
+@dataclass(frozen=True)
+class ResponseFit(Parameters):
+    """Parameters fitted to FRFs, and these in all poses; `files`: the files written."""
+
+    poses: tuple[PoseComparison, ...]
+    files: tuple[str, ...] = ()
+
+
+class _Residuals:
+    """Of FRFs in some poses, about θ = `center` (n,) exp x, with `equations` there and their `slopes` by θ."""
+
+    def __init__(
+        self,
+        poses: Sequence[MeasuredPose],
+        center: Array,
+        equations: Sequence[Array],
+        slopes: Sequence[Sequence[Array]],
+    ) -> None:
+        self._poses, self._center, self._equations, self.slopes = poses, center, equations, slopes
+
+    def equations(self, x: Array) -> list[Array]:
+        """The equations of all poses, linear in θ."""
+        change = self._center * np.expm1(x)
+        return [of + np.tensordot(change, by, axes=1) for of, by in zip(self._equations, self.slopes, strict=True)]
+
+    def at(self, x: Array, smoothing: Sequence[Array] = ()) -> tuple[Array, Array]:
+        """Residuals (m,) and their derivatives (m, n) by x; with a `smoothing` of each pose of magnitudes alone."""
+        values, slopes = [], []
+        poses = zip(self._poses, self.equations(x), self.slopes, strict=True)
+        for (pose, of, by), S in zip_longest(poses, smoothing):
+            H, dH = receptance(of, pose, by)
+            off = np.log(H / pose.receptance) / pose.deviation
+            by_x = (self._center * np.exp(x))[:, None, None] * dH / H / pose.deviation
+            parts = (off.real, off.imag) if S is None else (S @ off.real,)
+            parts_by_x = (by_x.real, by_x.imag) if S is None else (S @ np.ascontiguousarray(by_x.real),)
+            values += [part.ravel() for part in parts]
+            slopes += [part.reshape(len(x), -1) for part in parts_by_x]
+        return np.concatenate(values), np.hstack(slopes).T
+
+    def least(self, width: float) -> Array:
+        """The x (n,) of least squares, at most 1.5 away; of magnitudes smoothed over a `width` of ln f, if not 0."""
+        smoothing = []  # (k, F) means over ln f with Gaussian weights, a quarter of their width apart
+        for pose in self._poses if width else ():
+            places = np.log(pose.frequency)
+            apart = (np.arange(places[0], places[-1] + width / 4, width / 4)[:, None] - places) / width
+            weights = np.exp(-0.5 * apart**2)
+            smoothing.append(as_floats(weights / weights.sum(axis=1, keepdims=True)))
+        known: dict[bytes, tuple[Array, Array]] = {}
+
+        def at(x: Array) -> tuple[Array, Array]:
+            if x.tobytes() not in known:
+                known.clear()
+                known[x.tobytes()] = self.at(x, smoothing)
+            return known[x.tobytes()]
+
+        found = scipy.optimize.least_squares(
+            lambda x: at(x)[0],
+            np.zeros(len(self._center)),
+            jac=lambda x: at(x)[1],
+            bounds=(-1.5, 1.5),
+            x_scale="jac",
+            max_nfev=MOST_EVALUATIONS,
+            xtol=1e-2 if width else 1e-11,
+            ftol=1e-3 if width else 1e-14,
+            gtol=None,
+        )
+        return as_floats(found.x)
+
+
+def differentiated(equations: Equations, values: Array, place: Sequence[Array]) -> list[list[Array]]:
+    """Return ∂/∂θ of the equations by pose and parameter at `values` (n,), from those in `place`: exact if linear."""
+    found = []
+    for step in np.diag(STEP * values):
+        pairs = zip(equations(values + step), place, strict=True)
+        found.append([(ahead - here) / step.sum() for ahead, here in pairs])
+    return [list(of_pose) for of_pose in zip(*found, strict=True)]
+
+
+def _receptances(equations: Sequence[Array], poses: Sequence[MeasuredPose]) -> list[ComplexArray]:
+    """The FRFs (F, p) of all poses. Raises `InputError` for one of directions in which the robot does not move."""
+    found = [receptance(of, pose)[0] for of, pose in zip(equations, poses, strict=True)]
+    for pose, H in zip(poses, found, strict=True):
+        for one, h in zip(pose.responses, H.T, strict=True):
+            if np.abs(h).max() <= NO_MOTION * np.abs(one.receptance).max():
+                raise InputError(
+                    f'test "{pose.test.name}": {one.label}: expected an FRF of directions in which the model moves',
+                    "one without motion in the model: leave it out",
+                )
+    return found
+
+
+def fit_receptances(
+    equations: Equations, keys: Sequence[str], start: Array, poses: Sequence[MeasuredPose]
+) -> ResponseFit:
+    """Find the parameters (n,), from `start` on, whose FRFs come nearest to those measured in `poses`.
+
+    `equations` has those of `poses`, in their order; poses for validation are only compared.
+
+    Raises:
+        InputError: all poses are for validation, or FRFs do not distinguish the parameters.
+        SolveError: the iteration does not converge.
+    """
+    used = [k for k, pose in enumerate(poses) if not pose.test.validation]
+    if not used:
+        raise InputError("fit: expected a test that is not for validation", "none")
+    fitted = [poses[k] for k in used]
+
+    def of_used(values: Array) -> list[Array]:
+        found = equations(values)
+        return [found[k] for k in used]
+
+    before = _receptances(equations(start), poses)
+    theta, place, converged = as_floats(start), of_used(start), False
+    slopes = differentiated(of_used, theta, place)
+    J = _Residuals(fitted, theta, place, slopes).at(np.zeros(len(start)))[1]
+    check_distinguishable(J, keys, "FRFs", least=NO_EFFECT)
+    for width in (*SMOOTH, *[0.0] * MOST_PLACES):
+        about = _Residuals(fitted, theta, place, slopes)
+        x = about.least(width)
+        theta, place = as_floats(theta * np.exp(x)), of_used(theta * np.exp(x))
+        parts = [
+            (one, other) for pair in zip(place, about.equations(x), strict=True)
+            for one, other in zip(*map(unstacked, pair), strict=True)
+        ]  # fmt: skip
+        if max(np.linalg.norm(one - other) / (np.linalg.norm(one) or 1.0) for one, other in parts) > LINEAR:
+            slopes = differentiated(of_used, theta, place)
+        elif converged := not width and bool(np.abs(x).max() <= REACHED):
+            break
+    r, J = _Residuals(fitted, theta, place, slopes).at(np.zeros(len(start)))
+    check_distinguishable(J, keys, "FRFs")
+    if not converged:
+        raise SolveError(f"fit: no convergence within {MOST_PLACES} places: start nearer to the measured FRFs")
+    deviation, correlation = uncertainty_of(J, r, known=all(pose.is_known for pose in fitted))
+    return ResponseFit(
+        keys=tuple(keys),
+        start=as_floats(start),
+        value=theta,
+        relative_deviation=deviation,
+        correlation=correlation,
+        poses=tuple(map(PoseComparison, poses, before, _receptances(equations(theta), poses))),
+    )
+
+
+def draw_responses(fit: ResponseFit, path: Path) -> Path:
+    """Write a PNG picture of three poses and FRFs each, direct ones first, to `path` and return it.
+
+    Magnitudes above phases, a column for each pose; dots measured, lines fitted.
+    """
+    from matplotlib.figure import Figure
+
+    from ..pictures.figures.style import SIZE, style
+    from ..pictures.projection import COLORS
+
+    poses, content = fit.poses[:3], io.BytesIO()
+    with style():
+        figure = Figure(figsize=(SIZE[0] * max(len(poses), 1), 1.4 * SIZE[1]), layout="constrained")
+        axes = figure.subplots(2, len(poses), squeeze=False, sharex="col", height_ratios=(2, 1))
+        for (above, below), one in zip(axes.T, poses, strict=True):
+            f = one.pose.frequency
+            pairs = sorted(zip(one.pose.responses, one.after.T, strict=True), key=lambda pair: not pair[0].is_direct)
+            for (response, fitted), color in zip(pairs[:3], COLORS, strict=False):
+                measured = response.receptance
+                above.semilogy(f, 1e3 * np.abs(measured), ".", color=color, markersize=2.0)
+                above.semilogy(f, 1e3 * np.abs(fitted), color=color, label=response.label)
+                below.plot(f, np.degrees(np.angle(measured)), ".", color=color, markersize=2.0)
+                below.plot(f, np.degrees(np.angle(fitted)), color=color)
+            above.set_title(f"{one.pose.test.name}{' (validation)' * one.pose.test.validation}", loc="left")
+            above.set_ylabel("receptance (mm/N)")
+            above.legend()
+            below.set_ylabel("phase (°)")
+            below.set_yticks([-180, -90, 0, 90, 180])
+            below.set_xlabel("frequency (Hz)")
+        figure.savefig(content, format="png")
+    write_atomically(path, content.getvalue(), "picture", ours=True)
+    return path

@@ -1,6 +1,10 @@
-"""Measured frequency response functions (FRFs) of a robot, in poses: the TOML file of tests, in SI units and axes."""
+"""Measured frequency response functions (FRFs) of a robot in poses, in SI units and global axes.
 
-from collections.abc import Mapping
+The TOML file of tests, and the files that it names: universal files (dataset 58), CSV tables and .mat files.
+"""
+
+import io
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
@@ -9,15 +13,138 @@ import numpy as np
 from pydantic import Field
 
 from ..common.arrays import Array, Booleans, ComplexArray, as_floats
-from ..common.errors import InputError, either, quoted
+from ..common.errors import InputError, check_known, either, quoted
+from ..common.libraries import extras, scipy
 from ..common.rotations import of_rpy
 from ..common.structs import struct
 from ..common.tables import shown
-from ..common.toml_files import load_toml
+from ..common.toml_files import load_toml, read_bytes, read_csv
 from ..common.validation import InputFile, Record, validate
 from ..mbs.fields.field_types import NotNegative, PointReference, Positive
 from ..mbs.joints.joint import Angles
-from .frf_files import Column, read_columns
+
+ENDS = ("force", "response")
+COLUMNS = ("frequency", "force", "response", "real", "imaginary", "coherence")
+FORCE, ORDERS = 13, {8: 0, 11: 1, 12: 2}  # data types of UFF 58: what is measured per force
+LABELS = {0: ("m",), 1: ("m/s",), 2: ("m/s^2", "m/s2", "m/s²", "m/s**2")}  # of its units, where they are SI
+
+
+class Column(NamedTuple):
+    """An FRF as a file has it, with texts of its ends, "POINT/-x"."""
+
+    force: str
+    response: str
+    frequency: Array
+    values: ComplexArray
+    coherence: Array | None
+    order: int | None = None  # of the time derivative, where the file has it
+    is_si: bool = False
+
+
+def read_columns(path: Path) -> list[Column]:
+    """Read all FRFs of a file. Raises `InputError` for a file of another kind, and for one without FRFs."""
+    readers = {".uff": _universal, ".unv": _universal, ".58": _universal, ".csv": _of_csv, ".mat": _of_mat}
+    suffix = path.suffix.lower()
+    if suffix not in readers:
+        raise InputError(f"{path}: expected a file with {quoted(readers)}", f'"{path.name}"')
+    columns = list(readers[suffix](path))
+    if not columns:
+        raise InputError(f"{path}: expected frequency response functions (type 4 of dataset 58)", "none")
+    return columns
+
+
+def _universal(path: Path) -> Iterator[Column]:
+    """FRFs of datasets 58 with the coherence of the same ends; other functions are left out."""
+    with extras():
+        import pyuff
+    read_bytes(path, "universal file")
+    try:
+        file = pyuff.UFF(str(path))
+        sets = [file.read_sets(k) for k in np.flatnonzero(np.array(file.get_set_types()) == 58).tolist()]
+        for one in sets:
+            one["data"].real, one["x"], one["func_type"]
+    except Exception:  # whatever pyuff finds in a file that is none
+        raise InputError(f"{path}: expected datasets 58 of a universal file", "damaged ones") from None
+    ends = [(one["ref_node"], one["ref_dir"], one["rsp_node"], one["rsp_dir"]) for one in sets]
+    coherence = {at: one["data"].real for at, one in zip(ends, sets, strict=True) if one["func_type"] == 6}
+    for at, one in zip(ends, sets, strict=True):
+        if one["func_type"] != 4:  # an FRF
+            continue
+        kind, by = one["ordinate_spec_data_type"], one["orddenom_spec_data_type"]
+        if kind not in ORDERS or by != FORCE:
+            raise InputError(
+                f"{path}: node {at[2]}: expected displacement, velocity or acceleration (data types 8, 11, 12) per"
+                " force (13)",
+                f"types {kind} and {by}",
+            )
+        force, response = (f"{node:g}/{_axis(path, axis)}" for node, axis in (at[:2], at[2:]))
+        label = str(one["ordinate_axis_units_lab"]).strip().lower()
+        is_si = label in ("", "none", *LABELS[ORDERS[kind]])
+        values = one["data"].astype(complex)
+        yield Column(force, response, as_floats(one["x"]), values, coherence.get(at), order=ORDERS[kind], is_si=is_si)
+
+
+def _axis(path: Path, code: float) -> str:
+    if abs(code) not in (1, 2, 3):
+        raise InputError(f"{path}: expected translations along x, y, z (directions ±1, ±2, ±3)", f"{code:g}")
+    return "-" * (code < 0) + "xyz"[int(abs(code)) - 1]
+
+
+def _of_csv(path: Path) -> Iterator[Column]:
+    """FRFs of a table with a line for each frequency of each function."""
+    header, table = read_csv(path, "table of FRFs")
+    for name in header:
+        check_known(name, COLUMNS, f"{path}: line 1: expected columns among {quoted(COLUMNS)}")
+    if missing := [name for name in COLUMNS[:-1] if name not in header]:
+        raise InputError(f"{path}: line 1: expected the columns {quoted(COLUMNS[:-1])}", f"no {quoted(missing)}")
+    if not table:
+        raise InputError(f"{path}: expected a line for each frequency of each function below line 1", "none")
+    functions: dict[tuple[str, ...], list[list[float]]] = {}
+    for line, row in table:
+        if len(row) != len(header):
+            raise InputError(f"{path}: line {line}: expected {len(header)} cells", len(row))
+        cells = dict(zip(header, row, strict=True))
+        numbers = []
+        for cell in (cells[name] for name in COLUMNS if name in cells and name not in ENDS):
+            try:
+                numbers.append(float(cell))
+            except ValueError:
+                raise InputError(f"{path}: line {line}: expected a number", f'"{shown(cell)}"') from None
+        functions.setdefault(tuple(cells[end] for end in ENDS), []).append(numbers)
+    for (force, response), rows in functions.items():
+        values = np.array(rows)
+        coherence = as_floats(values[:, 3]) if values.shape[1] > 3 else None
+        yield Column(force, response, as_floats(values[:, 0]), values[:, 1] + 1j * values[:, 2], coherence)
+
+
+def _of_mat(path: Path) -> Iterator[Column]:
+    """FRFs of variables frequency (F,), H (F, p), force and response (p names), and perhaps coherence (F, p)."""
+    content = io.BytesIO(read_bytes(path, "file of FRFs"))
+    try:
+        data = scipy.io.loadmat(content, chars_as_strings=True)
+    except Exception:  # whatever SciPy finds in a file that is none
+        raise InputError(
+            f"{path}: expected a .mat file of version 7 or older (MATLAB: save -v7)", "another file"
+        ) from None
+    if missing := [name for name in ("frequency", "H", *ENDS) if name not in data]:
+        raise InputError(f"{path}: expected variables frequency, H, force and response", f"no {quoted(missing)}")
+    try:
+        frequency, H = data["frequency"].ravel().astype(float), data["H"].astype(complex)
+        ends = [[str(np.ravel(one)[0]).strip() for one in data[name].ravel()] for name in ENDS]
+        coherence = data["coherence"].astype(float) if "coherence" in data else np.full(H.shape, np.nan)
+    except (ValueError, TypeError, IndexError):
+        raise InputError(
+            f"{path}: expected numbers in frequency, H and coherence, and names in force and response", "others"
+        ) from None
+    shape = (len(frequency), len(ends[0]))
+    if not shape == H.shape == coherence.shape == (len(frequency), len(ends[1])):
+        raise InputError(
+            f"{path}: expected H and coherence with a line for each frequency and a column for each force and response",
+            f"H of shape {H.shape} for {shape[0]} frequencies, {shape[1]} forces and {len(ends[1])} responses",
+        )
+    for k, (force, response) in enumerate(zip(*ends, strict=True)):
+        yield Column(force, response, as_floats(frequency), H[:, k], coherence[:, k] if "coherence" in data else None)
+
 
 G = 9.80665  # m/s²
 UNITS = {
@@ -56,7 +183,7 @@ class ResponseTests(Record):
     """All tests of a robot."""
 
     test: tuple[ResponseTest, ...] = Field(min_length=1)
-    """The tests."""
+    """FRFs in one pose each."""
 
 
 class Direction(NamedTuple):
@@ -67,7 +194,7 @@ class Direction(NamedTuple):
 
     @property
     def label(self) -> str:
-        """The point and the axis, "fore.tip -z"; of an oblique one its components."""
+        """Text of the point and the axis, "fore.tip -z"; of an oblique axis its components."""
         for sign, value in (("", 1.0), ("-", -1.0)):
             if value in self.axis:
                 return f"{self.point} {sign}{'xyz'[self.axis.index(value)]}"
@@ -76,7 +203,7 @@ class Direction(NamedTuple):
 
 @struct
 class MeasuredResponse:
-    """A measured FRF as receptance, m/N, (F,) complex, of `response` by `force`; coherence (F,), NaN where unknown."""
+    """A measured FRF of `response` by `force`: receptance (F,), m/N, and coherence (F,), NaN where unknown."""
 
     force: Direction
     response: Direction
@@ -85,17 +212,17 @@ class MeasuredResponse:
 
     @property
     def is_direct(self) -> bool:
-        """Whether it is where and along what the force is."""
+        """Whether the response is measured where, and in the direction in which, the force acts."""
         return self.force == self.response
 
     @property
     def label(self) -> str:
-        """From where to where."""
+        """Text of the directions of force and response."""
         return f"{self.force.label} → {self.response.label}"
 
 
 class Ends(NamedTuple):
-    """The directions of p FRFs, each once, and the numbers (p,) of those of force and response among them."""
+    """The directions of p FRFs, each once, and the indices (p,) of those of force and response among them."""
 
     directions: list[Direction]
     force: list[int]
@@ -117,7 +244,7 @@ class MeasuredPose:
 
     @cached_property
     def ends(self) -> Ends:
-        """Where, and along what, forces act and responses are measured."""
+        """Directions of forces and responses."""
         pairs = [(one.force, one.response) for one in self.responses]
         directions = list(dict.fromkeys(end for pair in pairs for end in pair))
         force, response = ([directions.index(end) for end in ends] for ends in zip(*pairs, strict=True))
@@ -125,7 +252,7 @@ class MeasuredPose:
 
     @cached_property
     def receptance(self) -> ComplexArray:
-        """(F, p) m/N."""
+        """Measured receptances (F, p), m/N."""
         return np.column_stack([one.receptance for one in self.responses])
 
     @property
@@ -135,7 +262,10 @@ class MeasuredPose:
 
     @cached_property
     def deviation(self) -> Array:
-        """(F, p) of ln H: √((1 − γ²)/(2 n γ²)) (Bendat and Piersol, Random Data, 2010, 9.2); with unknown γ² all 1."""
+        """Standard deviation (F, p) of ln H, √((1 − γ²)/(2 n γ²)) (Bendat and Piersol, Random Data, 2010, 9.2).
+
+        1 where the coherence γ² is not known.
+        """
         coherence = np.column_stack([one.coherence for one in self.responses])
         averages = self.test.averages or 2
         spread = np.sqrt((1.0 - coherence) / (2.0 * averages * np.maximum(coherence, FLOOR)))
@@ -143,7 +273,7 @@ class MeasuredPose:
 
 
 def read_tests(path: Path) -> list[MeasuredPose]:
-    """The tests of the TOML file at `path`. Raises `InputError` for anything wrong with it or the files it names."""
+    """Read the tests of the TOML file at `path`. Raises `InputError` for errors in it or in the files it names."""
     tests = validate(ResponseTests, load_toml(path, "file of tests"), path).test
     for test in tests:
         if len(tests) > 1 and not test.pose:
@@ -185,11 +315,8 @@ def _check(where: str, column: Column, inside: Booleans) -> None:
         raise InputError(f"{where}: expected complex values", "positive real ones: a magnitude is no FRF")
     coherence = np.ones(1) if column.coherence is None else column.coherence[inside]
     if not ((coherence >= 0.0) & (coherence <= 1.0)).all():
-        raise InputError(f"{where}: coherence: expected values from 0 to 1", f"{_worst(coherence):g}")
-
-
-def _worst(coherence: Array) -> float:
-    return float(coherence[np.nan_to_num(np.abs(coherence - 0.5), nan=np.inf).argmax()])
+        worst = coherence[np.nan_to_num(np.abs(coherence - 0.5), nan=np.inf).argmax()]
+        raise InputError(f"{where}: coherence: expected values from 0 to 1", f"{worst:g}")
 
 
 def _response(test: ResponseTest, column: Column, inside: Booleans) -> MeasuredResponse:

@@ -56,7 +56,7 @@ class Fit(Parameters):
         labels: (m) names of the modes.
         measured, before, after: (m,) Hz.
         uncertainty: (m,) standard deviations of `measured`, Hz; None where not known.
-        files: that were written.
+        files: the files written.
     """
 
     labels: tuple[str, ...]
@@ -107,7 +107,7 @@ def fit_frequencies(
     measured: Array,
     uncertainty: Array | None = None,
 ) -> Fit:
-    """The parameters (n,), from `start` on, whose frequencies come nearest to the `measured` ones (m,), Hz.
+    """Find the parameters (n,), from `start` on, whose frequencies come nearest to the `measured` ones (m,), Hz.
 
     `uncertainty` (m,): standard deviations of these, Hz. `keys` and `labels` name parameters and modes.
 
@@ -159,7 +159,7 @@ def check_distinguishable(
 ) -> None:
     """Raise `InputError` for parameters, or combinations of them, without effect: null vectors of J (m, n), m ≥ n.
 
-    `least`: the effect of one, against the largest.
+    `least`: the smallest effect against the largest.
     """
     _, values, V = np.linalg.svd(J, full_matrices=False)
     sizes = np.linalg.norm(J, axis=0)
@@ -180,7 +180,10 @@ def check_distinguishable(
 
 
 def uncertainty_of(J: Array, r: Array, *, known: bool) -> tuple[Array, Array]:
-    """Standard deviations (n,) of ln θ, and correlations (n, n); NaN where as many residuals tell none."""
+    """Return standard deviations (n,) of ln θ, and correlations (n, n), by J (m, n) and residuals r (m,).
+
+    NaN for m = n without `known` uncertainties of the measured values.
+    """
     m, n = J.shape
     if not known and m == n:
         return np.full(n, np.nan), np.full((n, n), np.nan)

@@ -1,28 +1,35 @@
-"""A milling process from its file, and what it makes of one pose of a robot: `ffrobot map --milling`."""
+"""Stable depths of cut in the poses of a robot, `ffrobot map --milling`: by averaged forces, or semi-discretization.
 
+The forces on the tool are F = a C(φ) (r(t) − r(t − τ)) with the depth of cut a, the tooth period τ and r = (x, y): x is
+along the feed, y normal to it, and teeth turn from y to x. Averaged over φ, with the receptance G(iω) of r, vibration
+at ω persists where 1 = a (1 − exp(−iωτ)) ν with an eigenvalue ν of C̄ G: a = 1/(2 Re ν) (Y. Altintas and E. Budak,
+CIRP Annals 44, 1995). Of turning, C̄ = −K_s, that is −1/(2 K_s Re G).
+"""
+
+from __future__ import annotations
+
+from collections import deque
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..common.arrays import Array, as_floats
+from ..common.arrays import Array, ComplexArray, as_floats
 from ..common.errors import InputError
+from ..common.libraries import scipy
 from ..common.toml_files import load_toml
 from ..common.validation import Record, validate
 from ..mbs.fields.field_types import NotNegative, Positive, Quantity, Vector3
 from ..mbs.linear.joint_conditions import FreeCoordinates
-from .stability import Cutter, StabilityLimits, Tip, limit_depth, stability_limits
 
-BELOW, ABOVE = 10.0, 1000.0  # the depth without lobes: where those of lobes are sought
-ALONG = 1e-6  # of a direction, across the axis: none
 MOST_SPEEDS = 1000
 FEEDS = 12  # directions of feed within half a turn, beyond which forces are the same
 
 
 def spread(given: object) -> object:
-    """Evenly spaced numbers of a text "FIRST:LAST:COUNT"; anything else as it is."""
+    """Return the evenly spaced numbers of a text "FIRST:LAST:COUNT"; anything else as it is."""
     if not isinstance(given, str):
         return tuple(given) if isinstance(given, list) else given
     try:
@@ -66,20 +73,31 @@ class Milling(Record):
             raise ValueError("expected an axis with a direction, found zero")
         return self
 
+    def mean_forces(self, first: Array, last: Array) -> Array:
+        """Return means of C (…, 2, 2), N/m², of one tooth from angles `first` to `last` (…), rad, within [0, 2π]."""
+        low, high = (np.clip(angle, self.entry, self.exit) for angle in (first, last))
+        return (self._integral(high) - self._integral(low)) / np.asarray(last - first)[..., None, None]
+
+    def _integral(self, angle: Array) -> Array:
+        c, s, t, r = np.cos(2 * angle), np.sin(2 * angle), self.tangential, self.radial
+        less, more = angle - s / 2, angle + s / 2  # of 1 − cos 2φ and 1 + cos 2φ
+        rows = [[t * c / 2 - r * less, r * c / 2 - t * more], [t * less + r * c / 2, -t * c / 2 - r * more]]
+        return as_floats(0.5 * np.moveaxis(np.array(rows), (0, 1), (-2, -1)))
+
     @property
-    def cutter(self) -> Cutter:
-        """Teeth, coefficients and angles."""
-        return Cutter(self.teeth, self.tangential, self.radial, self.entry, self.exit)
+    def average(self) -> Array:
+        """The mean C̄ (2, 2), N/m², of all teeth over a turn."""
+        return self.teeth * self.mean_forces(np.array(0.0), np.array(2 * np.pi))
 
     def feeds(self, axes: Array) -> Array:
-        """Axes (n, 2, 3): unit vectors along the feed, and normal to it, so that the tool's axis is feed × normal.
+        """Return unit vectors (n, 2, 3), global axes, along each feed and normal to it; their product is the tool axis.
 
-        In global axes; `axes` (3, 3) has those of the point in rows. Raises `InputError` for a feed along the axis.
+        `axes` (3, 3): those of the point in rows. Raises `InputError` for a feed along the axis of the tool.
         """
         axis = np.array(self.axis) @ axes / np.linalg.norm(self.axis)
         given = np.eye(3)[np.abs(axis).argmin()] if self.feed is None else np.array(self.feed)
         x = given - axis * (axis @ given)
-        if (size := np.linalg.norm(x)) <= ALONG * np.linalg.norm(given):
+        if (size := np.linalg.norm(x)) <= 1e-6 * np.linalg.norm(given):
             raise InputError("milling: feed: expected a direction across the axis of the tool", "one along it")
         x /= size
         angles = np.arange(FEEDS) * np.pi / FEEDS if self.feed is None else np.zeros(1)
@@ -88,45 +106,176 @@ class Milling(Record):
 
 
 def read_milling(path: Path) -> Milling:
-    """The process in the TOML file at `path`. Raises `InputError` for wrong keys."""
+    """Read the process in the TOML file at `path`. Raises `InputError` for wrong keys."""
     return validate(Milling, load_toml(path, "milling file"), path)
 
 
 def stable_depths(milling: Milling, free: FreeCoordinates, J: Array, axes: Array) -> dict[str, Array]:
-    """Stable depths of a pose: with `free` coordinates and rows J (d, f) of the tip's translations along s.
+    """Return stable depths of a pose by its `free` coordinates and J (d, f), the tip's translations by s, global axes.
 
-    J is in global axes, `axes` (3, 3) has those of the tip in rows. `milling_depth` m: without chatter at any speed, of
-    the worst feed; `milling_best_depth` m: of the best one, `milling_feed` (3,). With speeds also `milling_lobes` (S,)
-    m there: averaged forces take the worst feed of each speed, semi-discretization that of `milling_depth`.
+    `axes` (3, 3): those of the tip in rows. `milling_depth`, m, without chatter at any speed, of the worst feed;
+    `milling_best_depth`, m, of the best one, `milling_feed` (3,). With speeds also `milling_lobes` (S,), m, there:
+    averaged forces take the worst feed of each speed, semi-discretization that of `milling_depth`.
     """
-    tip, feeds = _tip(free, J, milling.highest), milling.feeds(axes)
-    omega, G = tip.response()
-    limits = [stability_limits(milling.cutter.average, omega, across @ G @ across.T) for across in feeds]
-    depths = np.array([one.least for one in limits])
-    values = {
-        "milling_depth": depths.min(),
-        "milling_best_depth": depths.max(),
-        "milling_feed": feeds[depths.argmax(), 0],
-    }
-    if milling.speeds:
-        worst = tip._replace(J=feeds[depths.argmin()] @ tip.J)
-        values["milling_lobes"] = _lobes(milling, limits, worst, float(depths.min()))
-    return {name: np.asarray(value, dtype=float) for name, value in values.items()}
-
-
-def _tip(free: FreeCoordinates, J: Array, highest: float) -> Tip:
-    """The modes up to `highest` Hz of the free coordinates, with the tip's translations (3, m)."""
     values, V = np.linalg.eigh((free.K + free.K.T) / 2)
-    V = V[:, values < (2 * np.pi * highest) ** 2]
+    V = V[:, values < (2 * np.pi * milling.highest) ** 2]
     rows = np.zeros((3, V.shape[1]))
     rows[: len(J)] = J @ free.N @ V
-    return Tip(V.T @ free.K @ V, V.T @ free.D @ V, rows)
+    tip, feeds = Tip(V.T @ free.K @ V, V.T @ free.D @ V, rows), milling.feeds(axes)
+    omega, G = tip.response()
+    limits = [stability_limits(milling.average, omega, across @ G @ across.T) for across in feeds]
+    depths = np.array([one.least for one in limits])
+    least = float(depths.min())
+    found = {"milling_depth": least, "milling_best_depth": depths.max(), "milling_feed": feeds[depths.argmax(), 0]}
+    if milling.speeds:
+        found["milling_lobes"] = _lobes(milling, limits, tip._replace(J=feeds[depths.argmin()] @ tip.J), least)
+    return {name: np.asarray(value, dtype=float) for name, value in found.items()}
 
 
 def _lobes(milling: Milling, limits: Sequence[StabilityLimits], worst: Tip, least: float) -> Array:
-    """Stable depths (S,), m, at the speeds, by the `limits` of all feeds, or of the `worst` one, from `least` m on."""
+    """Stable depths (S,), m, at the speeds, by the `limits` of all feeds, or of the tip in the `worst` one."""
     speed = np.array(milling.speeds) * 2 * np.pi / 60
     if milling.method == "averaged" or not np.isfinite(least):
         return as_floats(np.min([one.lobes(milling.teeth, speed) for one in limits], axis=0))
-    bounds = least / BELOW, least * ABOVE
-    return np.array([limit_depth(worst, milling.cutter, float(each), bounds) for each in speed])
+    bounds = least / 10, least * 1000  # the depth without lobes
+    return np.array([limit_depth(worst, milling, float(each), bounds) for each in speed])
+
+
+NEAREST, FARTHEST = 0.03, 10.0  # frequencies off a mode: half-bandwidths and its frequency, between them
+NEAR, FAR = 100, 250  # as many frequencies on each side, within a half-bandwidth and beyond it
+LEAST = 1e-9  # damping ratio: without any, no depth is stable
+FINE = 0.5  # rad, of the fastest mode in a step of semi-discretization
+STEPS = (80, 400)  # of a tooth period, at least and at most
+RISE = 1.25  # from depth to depth, until one has chatter: above it may be others without
+THINNEST = 1e-12  # m: below it no depth is stable
+
+
+class Tip(NamedTuple):
+    """Vibrations q̈ + D q̇ + K q = Jᵀ F of a tip with r = J q, m: K, D (m, m) for unit masses, J (d, m), SI units."""
+
+    K: Array
+    D: Array
+    J: Array
+
+    def response(self) -> tuple[Array, ComplexArray]:
+        """Return ω (F,), rad/s, dense about the modes, and G(iω) (F, d, d), m/N."""
+        m = len(self.K)
+        A = np.block([[np.zeros((m, m)), np.eye(m)], [-self.K, -self.D]])
+        poles, V = np.linalg.eig(A)
+        left = np.linalg.inv(V)[:, m:] @ self.J.T
+        right = self.J @ V[:m]
+        some = poles[(poles.imag >= 0.0) & (poles != 0.0)]  # real ones, too: strong damping leaves depths a limit
+        size = np.abs(some)
+        bandwidth = np.maximum(np.abs(some.real), LEAST * size)
+        near = np.geomspace(NEAREST * bandwidth, bandwidth, NEAR)
+        off = np.concatenate([near, np.geomspace(bandwidth, FARTHEST * size, FAR)])
+        omega = np.concatenate([size - off, size + off]).ravel()
+        omega = np.unique(omega[omega > 0.0])
+        residues = right.T[:, :, None] * left[:, None, :]
+        return as_floats(omega), np.tensordot(1.0 / (1j * omega[:, None] - poles), residues, axes=1)
+
+
+class StabilityLimits(NamedTuple):
+    """Depths (F, k), m, at the edge of stability at frequencies `omega` (F,), rad/s; infinite where there is none.
+
+    `phase` (F, k): ωτ between 0 and 2π there.
+    """
+
+    omega: Array
+    depth: Array
+    phase: Array
+
+    @property
+    def least(self) -> float:
+        """The depth, m, up to which no spindle speed has chatter."""
+        return float(self.depth.min(initial=np.inf))
+
+    def lobes(self, teeth: int, speed: Array) -> Array:
+        """Return the lowest depths (S,), m, of all lobes of a cutter with `teeth` at spindle speeds (S,), rad/s."""
+        found = np.full(len(speed), np.inf)
+        turned = 2 * np.pi * self.omega / (teeth * speed[:, None])  # ωτ
+        for depth, phase in zip(np.where(np.isfinite(self.depth), self.depth, 0.0).T, self.phase.T, strict=True):
+            first = (turned[:, :-1] - phase[:-1]) / (2 * np.pi)  # whole where a lobe is
+            rise = (np.diff(turned) - ((np.diff(phase) + np.pi) % (2 * np.pi) - np.pi)) / (2 * np.pi)
+            low, high = np.minimum(first, first + rise), np.maximum(first, first + rise)
+            crossed = (depth[:-1] * depth[1:] > 0.0) & (np.ceil(low) <= high)
+            least_first = (rise > 0.0) == (np.diff(depth) > 0.0)  # of several lobes between two frequencies
+            lobe = np.where(least_first, np.ceil(low), np.floor(high))
+            share = (lobe - first) / np.where(crossed & (rise != 0.0), rise, 1.0)
+            between = depth[:-1] + share * np.diff(depth)
+            found = np.minimum(found, np.where(crossed, between, np.inf).min(axis=1, initial=np.inf))
+        return found
+
+
+def stability_limits(C: Array, omega: Array, G: ComplexArray) -> StabilityLimits:
+    """Return edges of stability for averaged forces `C` (d, d), N/m², by G (F, d, d), m/N, at `omega` (F,), rad/s."""
+    nu = _eigenvalues(C @ G)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        depth = np.where(nu.real > 0.0, 0.5 / nu.real, np.inf)
+        delayed = 1.0 - 1.0 / (depth * nu)  # exp(−iωτ)
+    return StabilityLimits(omega, as_floats(depth), as_floats(-np.angle(delayed) % (2 * np.pi)))
+
+
+def _eigenvalues(A: ComplexArray) -> ComplexArray:
+    """Eigenvalues (F, d) of matrices (F, d, d), d ≤ 2, in an order in which each changes least from one to the next."""
+    if A.shape[1] == 1:
+        return A[:, :, 0]
+    mean, det = (A[:, 0, 0] + A[:, 1, 1]) / 2, A[:, 0, 0] * A[:, 1, 1] - A[:, 0, 1] * A[:, 1, 0]
+    root = np.sqrt(mean**2 - det)
+    values = np.stack([mean + root, mean - root], axis=1)
+    kept, turned = (np.abs(values[1:] - other).sum(axis=1) for other in (values[:-1], values[:-1, ::-1]))
+    is_turned = np.append(False, np.cumsum(turned < kept) % 2 == 1)
+    return np.where(is_turned[:, None], values[:, ::-1], values)
+
+
+def growth(tip: Tip, cutter: Milling, depth: float, speed: float) -> float:
+    """Return the largest |eigenvalue| by which a tooth period multiplies small vibrations, above 1 with chatter.
+
+    By semi-discretization (T. Insperger and G. Stépán, Int. J. Numer. Meth. Engng 61, 2004): modes couple, and teeth
+    enter and leave the cut. `depth` in m, `speed` of the spindle in rad/s. In a step, r one tooth period ago has the
+    mean and the rise of a cubic through four of its values, so that a wave needs few steps. Raises `InputError` for too
+    many waves in a tooth period.
+    """
+    (K, D, J), m, pitch = tip, len(tip.K), 2 * np.pi / cutter.teeth
+    fastest = float(np.sqrt(np.abs(np.linalg.eigvals(K)).max(initial=0.0)))
+    if (turned := fastest * pitch / speed) > FINE * STEPS[1]:
+        raise InputError(
+            f"milling: semi-discretization: expected modes within {FINE * STEPS[1]:g} rad of a tooth period",
+            f"{turned:.4g} rad at {speed * 30 / np.pi:g} rev/min: lower the key highest, or average forces",
+        )
+    steps = max(STEPS[0], int(np.ceil(turned / FINE)))
+    edges, angles = np.linspace(0.0, pitch, steps + 1)[:, None], pitch * np.arange(cutter.teeth)
+    C = depth * cutter.mean_forces(edges[:-1] + angles, edges[1:] + angles).sum(axis=1)
+    A = np.zeros((steps, 2 * m + 4, 2 * m + 4))  # of q, q̇, of r one period ago, and of its rise in a step
+    A[:, :m, m : 2 * m], A[:, m : 2 * m, :m], A[:, m : 2 * m, m : 2 * m] = np.eye(m), J.T @ C @ J - K, -D
+    A[:, m : 2 * m, 2 * m : -2] = -J.T @ C
+    A[:, 2 * m : -2, -2:] = np.eye(2) * speed * steps / pitch
+    start = np.eye(2 * m + 2 * (steps + 1))
+    now, before = start[: 2 * m], deque(start[2 * m :].reshape(steps + 1, 2, -1), steps + 1)  # the newest r first
+    for moved in scipy.linalg.expm(A * pitch / speed / steps)[:, : 2 * m]:
+        rise = before[-3] - before[-2]
+        first = (13 * (before[-2] + before[-3]) - before[-1] - before[-4]) / 24 - rise / 2
+        before.appendleft(J @ now[:m])
+        now = moved @ np.vstack([now, first, rise])
+    return float(np.abs(np.linalg.eigvals(np.vstack([now, *before]))).max())
+
+
+def limit_depth(tip: Tip, cutter: Milling, speed: float, bounds: Sequence[float]) -> float:
+    """Return the least depth (m) between `bounds` (m) above which `growth` passes 1, to 0.1 %; infinite beyond them.
+
+    `speed` in rad/s. If vibrations grow at the lower bound already, a depth below it; 0 below `THINNEST`.
+    """
+    low, high = map(float, bounds)
+    while growth(tip, cutter, low, speed) > 1.0:
+        low, high = low / 10, low
+        if high < THINNEST:
+            return 0.0
+    while low < high and growth(tip, cutter, min(RISE * low, high), speed) <= 1.0:
+        low *= RISE
+    if low >= high:
+        return np.inf
+    high = RISE * low
+    while high / low > 1.001:
+        middle = float(np.sqrt(low * high))
+        low, high = (low, middle) if growth(tip, cutter, middle, speed) > 1.0 else (middle, high)
+    return low

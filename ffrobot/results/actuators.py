@@ -44,7 +44,7 @@ def write_voltages(group: h5py.Group, solution: Solution, actuation: Actuation) 
             entry.attrs["capacitance"] = patches.layout.capacitance()
             if np.any(-patches.amplifiers.range[0] != patches.amplifiers.range[1]):
                 entry.attrs["range"] = patches.amplifiers.range
-            entry.attrs.update({"body": body, "bends": patches.layout.acts_in})
+            entry.attrs.update({"body": body, "bends": patches.layout.bends})
 
 
 def write_feasibility(group: h5py.Group, solution: Solution, judged: Feasibility) -> None:

@@ -147,7 +147,5 @@ def find_actuation(scene: Scene, run: Run, bodies: Bodies, patches: Mapping[str,
     applied = {getattr(one, "apply", None) for one in scene.analysis if one.source == analysis.name}
     if analysis.supplies_all or applied & {"trajectory", "points"}:  # forces there need no modal forces
         others |= links.keys()
-    judged = judge_actuators(
-        path=scene.path, run=run, links=links, patches=patches, voltages=voltages, analysis=analysis, others=others
-    )
+    judged = judge_actuators(scene.path, run, links, patches, voltages, others)
     return Actuation(voltages, unmet, judged)

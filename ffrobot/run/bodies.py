@@ -24,8 +24,7 @@ from ..mbs.scene.bodies import BodyKeys, Payload, Tool, tensor
 from ..scene.scene import Scene
 
 if TYPE_CHECKING:
-    from ..actuation.patches.composite import PlacedLayout
-    from ..actuation.patches.structure import StructureEffect
+    from ..actuation.patches.composite import PlacedLayout, StructureEffect
 
 
 @struct
@@ -157,7 +156,7 @@ def with_structure(body: LoadedBody, placed: Sequence[PlacedLayout]) -> LoadedBo
     """Add mass and stiffness of patches to a link or a piece of it, according to its layouts."""
     if body.modal is None or not any(one.layout.adds_mass or one.layout.adds_stiffness for one in placed):
         return body
-    from ..actuation.patches.structure import patched_body, structure_effect_of
+    from ..actuation.patches.composite import patched_body, structure_effect_of
 
     spatial, carrying = (patched_body(of, body.modal, placed) for of in (body.spatial, body.carrying))
     effect = structure_effect_of(body.carrying, carrying)

@@ -101,7 +101,7 @@ class Prepared:
     def _off_axis(self) -> Iterator[str]:
         """Patches without a face on links whose faces are not at equal distances from the axis."""
         for array in (array for of_link in self.patches.values() for array in of_link.arrays.values()):
-            layout, stations = array.layout, self.links[array.body].stations
+            layout, stations = array.layout, self.links[array.layout.body].stations
             if layout.face is not None or stations.middle is None:
                 continue
             between, axis = (stations.height, 0) if layout.normal == "y" else (stations.width, 1)
@@ -111,8 +111,8 @@ class Prepared:
             off = np.where(under.any(axis=0), np.abs(stations.middle[:, axis]), 0.0)
             if (off > OFF_AXIS * between).any():
                 yield (
-                    f'pzt "{layout.label}": the axis of "{array.body}" is up to {1e3 * off.max():.2g} mm off the middle'
-                    " between its faces, where patches without face have the same arm on both: name the face"
+                    f'pzt "{layout.label}": the axis of "{layout.body}" is up to {1e3 * off.max():.2g} mm off the'
+                    " middle between its faces, where patches without face have the same arm on both: name the face"
                 )
 
 

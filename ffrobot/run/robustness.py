@@ -11,9 +11,8 @@ import numpy as np
 
 from ..actuation.context import ActuatedContext
 from ..actuation.control.closed_loop import ClosedLoop
-from ..actuation.control.records import JointPid
+from ..actuation.control.records import JointPid, Sensor
 from ..actuation.control.robot import ControlledRobot, default_tip
-from ..actuation.control.sensor_records import Sensor
 from ..common.arrays import Array
 from ..common.errors import SolveError
 from ..common.structs import struct

@@ -71,7 +71,7 @@ def _in_plane(of_link: LinkPatches, spatial: Body) -> PatchArray | None:
     feels_across = layout.face and any(
         moves[k] for k, of in enumerate(array.link.family) if of == "out-of-plane-bending"
     )
-    is_plain = layout.acts_in == "in-plane" and layout.fibre_angle is None and not layout.gives_way and not feels_across
+    is_plain = layout.bends == "in-plane" and layout.fibre_angle is None and not layout.gives_way and not feels_across
     return array if is_plain and not others else None
 
 

@@ -15,7 +15,7 @@ KINDS = Deferred(
         "forward": "ffrobot.mbs.analysis.forward:Forward",
         "static": "ffrobot.mbs.analysis.operating_points:Static",
         "linear": "ffrobot.actuation.control.linear:Linear",
-        "placement": "ffrobot.actuation.control.placement_analysis:PatchPlacement",
+        "placement": "ffrobot.actuation.control.placement:PatchPlacement",
         "motors-only": "ffrobot.mbs.inversion.motors_only:MotorsOnly",
         "tracking": "ffrobot.mbs.tracking.tracking:Tracking",
         "closed-loop": "ffrobot.actuation.control.closed_loop:ClosedLoop",

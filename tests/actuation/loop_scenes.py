@@ -1,4 +1,4 @@
-"""Scenes under sampled control: a wheel, two rods, gears that give."""
+"""Scenes under sampled control: a wheel, with an encoder and observers too, two rods, gears that give."""
 
 from dataclasses import replace
 
@@ -11,6 +11,10 @@ INERTIA, T = 0.5, 0.01
 ROD = {"mass": 2.0, "inertia": 2.0 / 12, "center": [0.5, 0.0], "points": {"root": [0.0, 0.0], "tip": [1.0, 0.0]}}
 ARM = {"O": {"joint": "O", "value": "0.4+0.9*sin(2*t)"}, "A": {"joint": "A", "value": "-1.1+0.7*cos(3*t)"}}
 PID = {"kind": "joint-pid", "proportional": {"O": 20.0}, "derivative": {"O": 4.0}}
+ENCODER = {"joint": "O", "noise": 1e-4}
+KALMAN = {"kind": "kalman", "process": {"joint/O": 0.5}}
+GAINS = {"kind": "gains", "inputs": ["joint/O"], "outputs": ["joint/O"]}
+GAINS |= {"A": [[0.5]], "B": [[1.0]], "C": [[1.0]], "gain": [[0.1]]}
 
 
 def loop(name="loop", **keys):
@@ -27,6 +31,11 @@ def wheel(*analyses, joint=None, target="0", bodies=(), joints=(), gravity=(0.0,
         name="wheel", gravity=gravity, body=[{"name": "w", "rigid": body}, *bodies], joint=[revolute, *joints],
         trajectory=[{"name": "stand", "joint": "O", "value": target}], analysis=[inverse, *analyses], **keys,
     )  # fmt: skip
+
+
+def observed(**keys):
+    """The wheel in a loop with a tip."""
+    return wheel(loop(tip="w.rim", **keys))
 
 
 def blow(force=5.0, until=0.1):

@@ -16,6 +16,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
 
 PAGE = Path(__file__).parents[2] / "docs" / "howto" / "tracking.md"
 TIME = np.linspace(0.0, 0.01, 1001)
+HYSTERESIS = {"weights": (0.8, 0.1, 0.06, 0.04), "thresholds": (0.0, 10.0, 30.0, 55.0)}
 
 
 def output(wanted, strain=0.0, **keys):
@@ -141,14 +142,15 @@ OPEN_LOOP = (
         ({"amplifier": {"current": 0.0}}, "greater than 0"),
         ({"permittivity": 0.0}, "greater than 0"),
         ({"permittivity": 7e-10}, r"above 7\.623e-10 F/m"),
+        ({"hysteresis": HYSTERESIS | {"thresholds": (0.0, 1.0)}}, "expected 4 thresholds, as weights, found 2"),
+        ({"hysteresis": HYSTERESIS | {"thresholds": (0.0, 30.0, 10.0, 55.0)}}, "expected ascending voltages from 0 on"),
+        ({"hysteresis": HYSTERESIS | {"thresholds": (1.0, 10.0, 30.0, 55.0)}}, "expected ascending voltages from 0 on"),
+        ({"hysteresis": HYSTERESIS | {"weights": (0.8, 0.1, 0.0, 0.1)}}, "greater than 0"),  # without an inverse
     ],
 )
-def test_amplifiers_that_do_not_fit(keys, text):
+def test_amplifiers_and_hysteresis_that_do_not_fit(keys, text):
     with pytest.raises(ValueError, match=text):
         layout(**keys)
-
-
-HYSTERESIS = {"weights": (0.8, 0.1, 0.06, 0.04), "thresholds": (0.0, 10.0, 30.0, 55.0)}
 
 
 def test_inverse_of_hysteresis_and_loop_area():
@@ -193,20 +195,6 @@ def test_fast_voltages_of_a_long_run():
     missed = np.abs(drive.size.sample(t)[0] - 0.5 * (V + last))
     assert missed.max() < 0.4  # V, where it turns or begins to follow
     assert np.median(missed) < 1e-3
-
-
-@pytest.mark.parametrize(
-    ("keys", "message"),
-    [
-        ({"thresholds": (0.0, 1.0)}, "expected 4 thresholds, as weights, found 2"),
-        ({"thresholds": (0.0, 30.0, 10.0, 55.0)}, "expected ascending voltages from 0 on"),
-        ({"thresholds": (1.0, 10.0, 30.0, 55.0)}, "expected ascending voltages from 0 on"),
-        ({"weights": (0.8, 0.1, 0.0, 0.1)}, "greater than 0"),
-    ],
-)
-def test_hysteresis_without_an_inverse_is_refused(keys, message):
-    with pytest.raises(ValueError, match=message):
-        layout(count=1, hysteresis=HYSTERESIS | keys)
 
 
 def test_hysteresis_leaves_a_path_and_its_inverse_comes_back(solved):

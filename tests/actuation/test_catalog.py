@@ -31,13 +31,6 @@ def test_inertia_alone(ratio):
     assert found.speed == pytest.approx(ratio * AMPLITUDE * OMEGA, rel=1e-12)
 
 
-def test_the_ratio_of_equal_inertias_takes_the_least_torque():
-    J = 4e-4
-    ratios = tuple(float(N) for N in range(30, 120, 5))
-    best = min(choices(swinging(), [motor(rotor_inertia=J, gear_ratio=ratios)]), key=lambda one: one.peak)
-    assert abs(best.ratio - np.sqrt(INERTIA / J)) <= 2.5
-
-
 def test_losses_of_the_gear_take_when_driving_and_help_when_braking():
     t = np.linspace(0.0, 1.0, 101)
     for sign, expected in ((1.0, 1 / 0.8), (-1.0, 0.8)):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from loop_scenes import INERTIA, PID, T, blow, loop, moving_at, wheel
 
-from ffrobot.actuation.control.sampling import sampled
+from ffrobot.actuation.control.linear_model import sampled
 from ffrobot.common.errors import InputError
 from ffrobot.pictures.figures.standard import standard_figures
 from ffrobot.results.file import Results
@@ -94,18 +94,6 @@ def test_unstable_gains_are_reported_and_the_results_kept():
     assert len(results.time("calm/control/commands")) == len(results["calm/control/readings"]) == 50
     (figure,) = [figure for figure in standard_figures(results) if figure.name == "tip_error"]
     assert [curve.label for curve in figure.curves] == ["wild", "calm"]
-
-
-@pytest.mark.parametrize(("factor", "verdict"), [(-1.1, "grows"), (-0.9, "stable")])
-def test_verdict_is_that_of_the_sampled_rate(factor, verdict):
-    """Derivative gain (1 − factor) I/T: the rate at the start is multiplied by `factor` at every sample."""
-    gains = {"kind": "joint-pid", "derivative": {"O": (1 - factor) * INERTIA / T}}
-    scene = wheel(loop(controller=[gains], tip="w.rim"), initial={"rates": {"w": 0.0}})
-    record = moving_at(lambda v: np.where(np.arange(len(v))[:, None] == 0, 0.01, 0.0), scene).details
-    rate = record.readings[:, record.outputs.index("joint/O/rate")]
-    assert rate[0] == 0.01  # as the inverse analysis has it
-    np.testing.assert_allclose(rate[1:], 0.01 * factor ** np.arange(49.0), rtol=1e-6)
-    assert record.metrics.verdict == verdict
 
 
 def test_slow_sampling_is_warned_of():

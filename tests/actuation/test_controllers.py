@@ -4,12 +4,9 @@ import runpy
 
 import numpy as np
 import pytest
-from loop_scenes import PID, T, blow, loop, two_rods, wheel
-from scipy.linalg import solve_discrete_are
+from loop_scenes import PID, blow, loop, two_rods, wheel
 
-from ffrobot.actuation.control.lqr import gains
 from ffrobot.actuation.control.robot import RigidArm
-from ffrobot.actuation.control.sampling import sampled
 from ffrobot.common.errors import SolveError
 from ffrobot.common.python_files import python_allowed
 from ffrobot.mbs.quantities.supply import motor_moments
@@ -56,15 +53,6 @@ def test_the_rigid_arm_says_where_its_links_do_not_reach():
     assert np.abs(np.cos(q) - crank).min() < 1e-9
     with pytest.raises(SolveError, match="expected joint angles that the rigid links can have, found"):
         arm.place(np.array([0.45]))
-
-
-def test_lqr_gains_are_those_of_scipy():
-    A, B = np.array([[0.0, 1.0], [-4.0, -0.1]]), np.array([[0.0], [2.0]])
-    Q, R = np.diag([100.0, 1.0]), np.array([[0.04]])
-    model = sampled(A, B, T, 0.0)
-    X = solve_discrete_are(model.A, model.B, Q, R)
-    expected = np.linalg.solve(R + model.B.T @ X @ model.B, model.B.T @ X @ model.A)
-    np.testing.assert_allclose(gains(model, Q, R), expected, rtol=1e-9)
 
 
 def test_a_function_of_the_user_acts_like_the_same_controller_of_the_scene(tmp_path):

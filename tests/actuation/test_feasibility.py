@@ -178,7 +178,7 @@ def test_rms_and_shares_of_time_by_hand():
 )
 def test_jump_of_a_path_is_seen(value, jump):
     result = arm(trajectory={"joint": "O", "value": value}).analyses["motion"]
-    assert path_jump(result.run, result.analysis, 0) == jump
+    assert path_jump(result.run, 0) == jump
 
 
 def test_short_peaks_of_motors_only_are_laid_to_the_jerk():

@@ -4,17 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from observed_wheel import T
+from loop_scenes import T
 from scipy.linalg import expm, solve_discrete_are
 from scipy.stats import chi2
 
-from ffrobot.actuation.control.linear_model import LinearModel
-from ffrobot.actuation.control.lqr import gains
+from ffrobot.actuation.control.controllers import gains
+from ffrobot.actuation.control.linear_model import LinearModel, by_doubling, sampled, zero_order_hold
 from ffrobot.actuation.control.margins import Feedback, loop_eigenvalues
 from ffrobot.actuation.control.observer import Schedule, hidden, kalman
-from ffrobot.actuation.control.observer_records import KalmanObserver
-from ffrobot.actuation.control.sampling import by_doubling, riccati, sampled, zero_order_hold
-from ffrobot.actuation.control.sensor_records import Sensor
+from ffrobot.actuation.control.records import KalmanObserver, Sensor
 from ffrobot.actuation.control.signals import Signal
 
 K_SPRING, PUSH, NOISE = 40.0, (0.7, 0.3), (2e-3, 5e-3)
@@ -52,13 +50,6 @@ def test_samples_do_not_depend_on_the_units_of_states():
     Phi, _ = zero_order_hold(unit[:, None] * A / unit, unit[:, None], T)
     for row, right in zip(Phi * unit / unit[:, None], expected, strict=True):
         np.testing.assert_allclose(row, right, rtol=0.0, atol=1e-12 * np.abs(right).max())
-
-
-def test_riccati_of_one_state_in_closed_form():
-    a, q, r = 1.1, 0.3, 0.02
-    half = ((a * a - 1) * r + q) / 2
-    found = riccati(np.array([[a]]), np.eye(1), np.array([[q]]), np.array([[r]]))
-    assert found[0, 0] == pytest.approx(half + np.sqrt(half**2 + q * r), rel=1e-12)
 
 
 def test_riccati_by_doubling():
@@ -135,23 +126,11 @@ def test_poles_of_the_loop_are_those_of_controller_and_observer(delay):
     assert np.abs(large[:, None] - found).min(axis=1).max() < 1e-9
 
 
-def test_errors_are_as_large_as_their_covariance_says():
-    """NEES of 500 runs: chi-square, by the state after 300 samples; with every bound that one in 500 misses."""
-    model, observer, rng, runs = two_masses(0.3), filter_of(two_masses(0.3)), np.random.default_rng(5), 500
-    Phi, Gamma = zero_order_hold(model.A, model.B, T)
-    x = ahead = np.zeros((runs, 4))
-    for _ in range(300):
-        y = x @ model.C[:2].T + rng.standard_normal((runs, 2)) * NOISE
-        estimate = ahead + (y - ahead @ observer.C.T) @ observer.L.T
-        error, ahead = x - estimate, estimate @ observer.A.T
-        x = x @ Phi.T + rng.standard_normal((runs, 2)) * PUSH @ Gamma.T
-    nees = np.einsum("ri,ij,rj->", error, np.linalg.inv(observer.covariance), error)
-    low, high = chi2.ppf([1e-3, 1 - 1e-3], 4 * runs)
-    assert low < nees < high
-
-
 def test_accelerometers_feel_the_loads_that_push_the_robot():
-    """NEES as above: a reading D w + noise and the next state have the load w in common."""
+    """NEES of 500 runs: a reading D w + noise and the next state have the load w in common.
+
+    Chi-square, by the state after 300 samples; with every bound that one in 500 misses.
+    """
     plain, rng, runs = two_masses(0.3), np.random.default_rng(6), 500
     rows = {"a/acceleration": 2, "b/acceleration": 3}
     model = replace(

@@ -14,8 +14,8 @@ from ffrobot.actuation.control.linear_model import (
     observability,
     robot_modes,
     state_space,
+    zeros,
 )
-from ffrobot.actuation.control.zeros import zeros
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.linear.linearisation import LinearEquations
 from ffrobot.mbs.model.masses import with_payload

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from beam_links import beam_link, tube
+from loop_scenes import INERTIA, T, wheel
 from scipy.linalg import expm
 
-from ffrobot.actuation.control.linear_model import LinearModel, locked_frequencies
+from ffrobot.actuation.control.linear_model import LinearModel, locked_frequencies, sampled
 from ffrobot.actuation.control.margins import (
     FRACTION,
     joint_gains,
@@ -20,28 +21,17 @@ from ffrobot.actuation.control.margins import (
     suggested_gains,
 )
 from ffrobot.actuation.control.records import JointPid
-from ffrobot.actuation.control.sampling import sampled
 from ffrobot.results.file import Results
 from ffrobot.results.write import results_image
 from ffrobot.run.solve import solve_scene
 from ffrobot.scene.load import make_scene
 
-INERTIA, T = 0.5, 0.01
+LINEAR = {"name": "linear", "kind": "linear"}
 
 
 def models(scene):
-    """The linear models of the scene's only analysis."""
+    """The linear models of the analysis "linear"."""
     return solve_scene(scene).outcomes["linear"].details.models
-
-
-def wheel():
-    """I γ̈ = u."""
-    body = {"mass": 1.0, "inertia": INERTIA, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0]}}
-    joint = {"name": "O", "type": "revolute", "between": ["ground", "w.root"]}
-    linear = {"name": "linear", "kind": "linear"}
-    return make_scene(
-        name="wheel", gravity=[0.0, 0.0], body=[{"name": "w", "rigid": body}], joint=[joint], analysis=[linear]
-    )
 
 
 def pid(P=0.0, D=0.0, integral=0.0, joint="O", rate="measured"):
@@ -69,7 +59,7 @@ def links(rng, count, payload, rotors, analysis, modes=3, **keys):
 
 def test_margins_of_an_inertia_are_those_of_the_closed_form():
     """det(z I − F) of the sampled double integrator: stable for D > P T/2 and D < 2 I/T (Jury)."""
-    plants = models(wheel())
+    plants = models(wheel(LINEAR))
     for P, D in ((20.0, 4.0), (300.0, 10.0)):
         found = margins([(plants[0], joint_gains(plants[0], [pid(P, D)], T))], T, 0.0)
         assert found.is_stable
@@ -94,7 +84,7 @@ def test_vibrations_that_samples_miss_are_not_taken_for_slow_ones():
 
 def test_delay_margin_of_a_fast_sampled_loop_is_that_of_the_continuous_one():
     """L = (P + D s) e^{−s d}/(I s²): the delay that takes the phase margin, less half a sample that holding costs."""
-    plants, fast, P, D = models(wheel()), 0.004, 20.0, 4.0
+    plants, fast, P, D = models(wheel(LINEAR)), 0.004, 20.0, 4.0
     omega = np.sqrt((D**2 + np.sqrt(D**4 + 4 * P**2 * INERTIA**2)) / (2 * INERTIA**2))  # |L| = 1
     phase = np.arctan2(D * omega, P)
     found = margins([(plants[0], joint_gains(plants[0], [pid(P, D)], fast))], fast, 0.0)
@@ -108,7 +98,7 @@ def test_of_a_delay_of_many_samples_stability_alone_is_known():
     for _ in range(20):
         value = INERTIA * s**2 + (P + D * s) * np.exp(-s * late)
         s -= value / (2 * INERTIA * s + (D - late * (P + D * s)) * np.exp(-s * late))
-    plant = models(wheel())[0]
+    plant = models(wheel(LINEAR))[0]
     found = margins([(plant, joint_gains(plant, [pid(P, D)], fast))], fast, delay)
     assert np.log(found.radius) / fast == pytest.approx(s.real, rel=1e-4)
     assert found.is_stable
@@ -117,7 +107,7 @@ def test_of_a_delay_of_many_samples_stability_alone_is_known():
 
 def test_amplifiers_are_in_the_loop():
     """A lag is a state, V' = (u − V)/τ, a delay of the amplifier one more of the loop; of two inputs each its own."""
-    plant, tau = models(wheel())[0], 0.7 * T
+    plant, tau = models(wheel(LINEAR))[0], 0.7 * T
     gains = joint_gains(plant, [pid(20.0, 4.0)], T)
     slow = np.block([[plant.A, plant.B], [np.zeros((1, 2)), -np.ones((1, 1)) / tau]])
     both = np.block([[slow, np.array([[0.0], [0.0], [1 / tau]])], [np.zeros((1, 4))]])
@@ -136,21 +126,6 @@ def test_amplifiers_are_in_the_loop():
     u = np.array([1.0, -2.0])
     alone = single.A @ x[:2] + single.B[:, 0] * u[0] + (waiting.A @ np.append(0.0 * x[:2], x[3]))[:2]
     np.testing.assert_allclose((model.A @ x + model.B @ u)[:2], alone, rtol=1e-12)
-
-
-def test_integral_and_differences_are_in_the_loop():
-    """Roots of the sampled loops' polynomials, written out: PID with ẏ as the difference of two readings."""
-    plants = models(wheel())
-    P, D, integral = 15.0, 3.0, 30.0
-    b = T**2 / (2 * INERTIA)
-    # y/u = b (z + 1)/(z − 1)²; u/y = −(P + D (1 − 1/z)/T + I T z/(z − 1))
-    plant = np.polymul([1, -1], [1, -1])
-    control = np.polyadd(
-        np.polymul([P + D / T, -D / T], [1, -1]), np.polymul([integral * T, 0.0], [1, 0])
-    )  # over z (z − 1)
-    loop = np.polyadd(np.polymul(np.polymul(plant, [1, 0]), [1, -1]), b * np.polymul([1, 1], control))
-    found = spectral_radius(plants[0], joint_gains(plants[0], [pid(P, D, integral, rate="difference")], T), T, 0.0)
-    assert found == pytest.approx(np.abs(np.roots(loop)).max(), rel=1e-9)
 
 
 def simulated(rng_seed, gains, sample_time, delay, kick=1e-4):
@@ -207,7 +182,7 @@ def test_suggested_gains_are_stable_on_random_arms(seed):
     count, sample_time = int(rng.integers(1, 4)), float(rng.choice([5e-4, 1e-3, 2e-3]))
     delay = float(rng.choice([0.0, 0.5, 1.0]) * sample_time)
     rotors = [float(rng.choice([0.0, 0.01, 0.1])) if seed % 2 else 0.03 for _ in range(count)]
-    plants = models(links(rng, count, float(rng.uniform(0.1, 2.0)), rotors, [{"name": "linear", "kind": "linear"}]))
+    plants = models(links(rng, count, float(rng.uniform(0.1, 2.0)), rotors, [LINEAR]))
     suggestion = suggested_gains(plants, sample_time, delay)
     if suggestion is None:
         assert 0.0 in rotors  # roots without inertia leave no gain that is stable
@@ -221,8 +196,8 @@ def test_suggested_gains_are_stable_on_random_arms(seed):
 def test_suggested_gains_hold_the_simulated_arm():
     """Those of the linear analysis, at the sample time that it names; its bandwidth is the third that it says."""
     rng = np.random.default_rng(5)
-    (plant,) = models(links(rng, 1, 0.2, [0.05], [{"name": "linear", "kind": "linear"}]))
-    solution = solve_scene(links(np.random.default_rng(5), 1, 0.2, [0.05], [{"name": "linear", "kind": "linear"}]))
+    (plant,) = models(links(rng, 1, 0.2, [0.05], [LINEAR]))
+    solution = solve_scene(links(np.random.default_rng(5), 1, 0.2, [0.05], [LINEAR]))
     details = solution.outcomes["linear"].details
     suggestion, sample_time = details.suggested
     J = joint_inertia(plant)[0, 0]

@@ -4,11 +4,11 @@ import re
 
 import numpy as np
 import pytest
-from observed_wheel import ENCODER, GAINS, INERTIA, KALMAN, PID, T, wheel
+from loop_scenes import ENCODER, GAINS, INERTIA, KALMAN, PID, T, observed
 from scipy.linalg import solve_discrete_are
 
 import ffrobot
-from ffrobot.actuation.control.sampling import sampled, zero_order_hold
+from ffrobot.actuation.control.linear_model import sampled, zero_order_hold
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.exchange.export import export_file
 from ffrobot.scene.load import make_scene
@@ -20,7 +20,7 @@ def test_a_loop_with_an_observer_is_its_exact_discrete_model():
     push = [{"point": "w.rim", "y": f"{moment / 0.3!r}"}]  # at r = 0.3 m
     observer = KALMAN | {"disturbance": {"joint/O": drift}, "reject": True}
     results = ffrobot.solve(
-        wheel(sensor=[ENCODER], controller=[PID], observer=observer, disturbance=push, delay=delay, seed=seed)
+        observed(sensor=[ENCODER], controller=[PID], observer=observer, disturbance=push, delay=delay, seed=seed)
     )
     A = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1 / INERTIA], [0.0, 0.0, 0.0]])
     B = np.array([[0.0], [1 / INERTIA], [0.0]])
@@ -50,7 +50,7 @@ def test_controller_and_observer_are_one_system_in_discrete_time(tmp_path, late)
     control = pytest.importorskip("control")
     push = [{"point": "w.rim", "y": "1"}]
     results = ffrobot.solve(
-        wheel(sensor=[ENCODER | {"delay": late}], controller=[PID], observer=KALMAN, disturbance=push),
+        observed(sensor=[ENCODER | {"delay": late}], controller=[PID], observer=KALMAN, disturbance=push),
         output=tmp_path / "w.results.h5",
     )
     system = results.controller("loop").to_control()
@@ -74,7 +74,7 @@ def test_controller_and_observer_are_one_system_in_discrete_time(tmp_path, late)
     with pytest.raises(InputError, match=r'expected a closed loop of linear controllers .*"loop".*found "inverse"'):
         results.controller("inverse")
     switched = [{"kind": "python", "python": lambda setup: lambda k, y: -0.01 * np.sign(y[:1])}]
-    other = ffrobot.solve(wheel(sensor=[ENCODER], controller=[PID, *switched], disturbance=push))
+    other = ffrobot.solve(observed(sensor=[ENCODER], controller=[PID, *switched], disturbance=push))
     with pytest.raises(InputError, match=r'expected a closed loop of linear controllers \(none\), found "loop"'):
         other.state_spaces("loop")
 
@@ -93,7 +93,7 @@ def test_a_function_beside_an_observer_is_asked_in_order_for_margins():
     stiff = PID | {"derivative": {}}
     keys = {"sensor": [ENCODER], "observer": KALMAN, "sample_time": T / 5}
     keys |= {"disturbance": [{"point": "w.rim", "y": "1"}]}
-    found = [ffrobot.solve(wheel(controller=of, **keys)) for of in ([stiff, python], [PID])]
+    found = [ffrobot.solve(observed(controller=of, **keys)) for of in ([stiff, python], [PID])]
     margins = [results.attributes("loop/control")["gain_margin"] for results in found]
     assert margins[0] == pytest.approx(margins[1], rel=1e-2)
 
@@ -167,7 +167,7 @@ def test_a_scheduled_controller_is_a_table_of_systems(tmp_path):
 )  # fmt: skip
 def test_what_an_observer_cannot_be_made_of(keys, said):
     with pytest.raises(InputError, match=said):
-        ffrobot.solve(wheel(**{"controller": [{"kind": "lqr"}] if "sensor" in keys else []} | keys))
+        ffrobot.solve(observed(**{"controller": [{"kind": "lqr"}] if "sensor" in keys else []} | keys))
 
 
 def test_a_slower_sensor_keeps_its_reading_and_an_observer_takes_it():
@@ -175,7 +175,7 @@ def test_a_slower_sensor_keeps_its_reading_and_an_observer_takes_it():
     slow = ENCODER | {"sample_time": 3 * T, "delay": T}
     feedback = {"kind": "state-feedback", "inputs": ["joint/O"], "gain": [[1.0]]}
     push = [{"point": "w.rim", "y": "1"}]
-    results = ffrobot.solve(wheel(sensor=[slow], controller=[feedback], observer=GAINS, disturbance=push, seed=3))
+    results = ffrobot.solve(observed(sensor=[slow], controller=[feedback], observer=GAINS, disturbance=push, seed=3))
     y, x, expected = results["loop/control/readings"][:, 0], 0.0, []
     for k, now in enumerate(y):
         assert now == y[k - k % 3]
@@ -194,4 +194,4 @@ def test_an_estimate_that_diverges_ends_the_run_with_its_cause():
 
     sensor = ENCODER | {"range": 1e-3}  # which hides from it what the wheel does
     with pytest.raises(SolveError, match=r"observer: the estimate diverges at t = .*does not fit the motion"):
-        ffrobot.solve(wheel(sensor=[sensor], observer=KALMAN, controller=[{"kind": "python", "python": pushing}]))
+        ffrobot.solve(observed(sensor=[sensor], observer=KALMAN, controller=[{"kind": "python", "python": pushing}]))

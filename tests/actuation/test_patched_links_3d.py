@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from beam_links import beam_link, modal_body, rectangle, tube
 
-from ffrobot.actuation.patches.lamina import Fibres, fibre_lamina, plain_lamina
+from ffrobot.actuation.patches.composite import patched_body
 from ffrobot.actuation.patches.link_patches import check_reach, link_patches, placed_patches
-from ffrobot.actuation.patches.records import PztLayout
-from ffrobot.actuation.patches.structure import patched_body
+from ffrobot.actuation.patches.records import PztLayout, fibre_lamina, plain_lamina
 from ffrobot.common.errors import InputError
 from ffrobot.common.validation import validate
 from ffrobot.fe_models.beam.section_stress import surface_shear
@@ -117,8 +116,9 @@ def classical(angle):
 
 @pytest.mark.parametrize("angle", [-0.7, 0.0, 0.3, np.pi / 4, 1.2])
 def test_layer_of_fibres_at_an_angle(angle):
-    keys = ("modulus", "modulus_across", "shear_modulus", "poissons_ratio", "d33", "d31")
-    found = fibre_lamina(Fibres(*(FIBRES[key] for key in keys), angle, FIBRES["electrode_spacing"]))
+    symbols = ("E_1", "E_2", "G_12", "nu_12", "d33", "d31", "spacing")
+    keys = ("modulus", "modulus_across", "shear_modulus", "poissons_ratio", "d33", "d31", "electrode_spacing")
+    found = fibre_lamina(angle=angle, **{symbol: FIBRES[key] for symbol, key in zip(symbols, keys, strict=True)})
     C, per_volt = classical(angle)
     np.testing.assert_allclose(found.C, C, rtol=1e-12, atol=1e-3)
     np.testing.assert_allclose(found.per_volt, per_volt, rtol=1e-12, atol=1e-9 * np.abs(per_volt).max())
@@ -168,15 +168,6 @@ def test_shear_around_a_rectangle(ratio):
     h, b = ratio * 0.01, 0.01
     around = 2 * (b * surface_shear(h, b, b) + h * surface_shear(b, h, h))
     assert around == pytest.approx(2 * h * b, rel=1e-4)
-
-
-def test_fibres_along_the_axis_bend_as_plain_ceramic_does():
-    """E_1 d33 (t/s) in the place of E d31, with the stiffness of E_1."""
-    body = link(SQUAT)
-    fibres = layout(face="both", fibre_angle=0.0)
-    d31 = FIBRES["d33"] * FIBRES["thickness"] / FIBRES["electrode_spacing"]
-    plain = layout(face="both", modulus=FIBRES["modulus"], d31=d31, thickness=FIBRES["thickness"])
-    np.testing.assert_allclose(tip(body, [fibres])[0], tip(body, [plain])[0], rtol=1e-9, atol=1e-15)
 
 
 def test_both_faces_driven_apart_are_the_layout_on_both():

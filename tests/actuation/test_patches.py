@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from beam_links import modal_body, paper_link
-from patches_on_links import SCENE, bent, layout, modes_in_the_plane, on_link, patches, planar_body
+from patches_on_links import SCENE, layout, modes_in_the_plane, on_link, patches, planar_body
 
 from ffrobot.actuation.patches.link_patches import check_reach, link_patches
 from ffrobot.actuation.patches.patches import solve_voltages
@@ -73,18 +73,6 @@ def test_patches_that_only_bend_leave_axial_modes_as_they_are(all_modes):
         left = of_link.unmet(F_p, of_link.voltages(F_p)["link"].required)
         np.testing.assert_allclose(left[:, rows], 0.0, atol=1e-8)
         np.testing.assert_array_equal(np.delete(left, rows, axis=1), np.delete(F_p, rows, axis=1))
-
-
-@pytest.mark.parametrize(("face", "sign"), [("+y", -1.0), ("-y", 1.0), ("both", 0.0)])
-def test_one_face_also_stretches_the_link(all_modes, face, sign):
-    """u(L) = ∓E_p d31 w_p V x2/EA of a bar: of it one axial mode gives 8/π² sin(πx2/2L) L/x2."""
-    planar = planar_body(all_modes)
-    p = bent(planar, on_link(all_modes, centers=(0.025,), face=face), np.array([100.0]))
-    stretch = planar.points["tip"].translation[0] @ p
-    EA = 2.068427e11 * 0.025 * 0.015
-    pull = sign * 63e9 * 110e-12 * 0.025 * 100.0
-    share = 8 / np.pi**2 * np.sin(np.pi / 2 * 0.05) / 0.05  # of mode sin(πx/2L) at the tip
-    assert stretch == pytest.approx(pull * 0.05 / EA * share, rel=1e-3, abs=1e-18)
 
 
 def test_weights_of_points_keep_the_tip_where_it_is_wanted(cantilever):

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from beam_links import paper_link
-from observed_wheel import INERTIA, T, wheel
+from loop_scenes import INERTIA, T, wheel
 
 import ffrobot
-from ffrobot.actuation.control.sensor_records import Sensor
+from ffrobot.actuation.control.records import Sensor
 from ffrobot.actuation.control.signals import Filter, Signal
 from ffrobot.exchange.fmu.linear_fmu import joint_units, linear_variables
 from ffrobot.scene.load import make_scene
@@ -30,7 +30,7 @@ def test_sensors_are_outputs_of_linear_models():
     """A wheel: γ̇ = u/(I s), which a gyro reads, too; r u/I along y at r = 0.3 m, and u/(I s²) of an encoder."""
     sensors = [{"joint": "O", "measure": "rate"}, {"point": "w.rim", "measure": "accelerometer"},
                {"point": "w.rim", "measure": "gyro"}, {"joint": "O", "noise": 1.0}]  # fmt: skip
-    results = ffrobot.solve(wheel(analysis=[{"name": "at_rest", "kind": "linear", "sensor": sensors}]))
+    results = ffrobot.solve(wheel({"name": "at_rest", "kind": "linear", "sensor": sensors}))
     model, omega = results.linear("at_rest")[0], np.array([0.5, 3.0, 20.0])
     s = 1j * omega
     names = [

@@ -6,9 +6,9 @@ from beam_links import beam_link, modal_body, rectangle
 from patches_on_links import SCENE
 from solid_strip import SolidStrip
 
+from ffrobot.actuation.patches.composite import patched_body
 from ffrobot.actuation.patches.link_patches import link_patches, placed_patches
 from ffrobot.actuation.patches.records import PztLayout
-from ffrobot.actuation.patches.structure import patched_body
 from ffrobot.common.validation import validate
 from ffrobot.mbs.model.body import from_modal_body
 

@@ -11,8 +11,7 @@ from scipy.spatial.transform import Rotation
 from tables_3d import joint, rigid, scene
 
 import ffrobot
-from ffrobot.actuation.patches.composite import PlacedLayout
-from ffrobot.actuation.patches.structure import patched_body
+from ffrobot.actuation.patches.composite import PlacedLayout, patched_body
 
 ALL = ["in-plane-bending", "out-of-plane-bending", "torsion", "axial"]
 AT_REST, UPRIGHT = [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]

@@ -10,7 +10,7 @@ from ffrobot.actuation.control.metrics import Metrics
 from ffrobot.actuation.control.placement import Evaluation
 from ffrobot.actuation.feasibility import PatchFeasibility, Remedies, Unsupplied
 from ffrobot.actuation.motors import MotorFeasibility
-from ffrobot.actuation.patches.structure import StructureEffect
+from ffrobot.actuation.patches.composite import StructureEffect
 from ffrobot.common.hdf5 import in_memory
 from ffrobot.common.meanings import MODAL_BODY, RESULTS, meaning, names_of, write_record
 from ffrobot.fe_models.modal_body import Interface, MeasuredValues, OutlinedPatches, PictureMesh, Stations, StressPoint

@@ -42,7 +42,7 @@ def mapped(tmp_path_factory):
 def depth(pose, milling, chain=ARM, lines=8_000):
     """1/(2 max Re ν) of the averaged forces of the worst of twelve feeds, from receptances at many frequencies."""
     G = receptance(chain, pose, np.array(TOOL), np.geomspace(2.0, 400.0, lines))
-    A = np.array([milling.cutter.average @ E @ G @ E.T for E in milling.feeds(np.eye(3))])
+    A = np.array([milling.average @ E @ G @ E.T for E in milling.feeds(np.eye(3))])
     mean, det = np.trace(A, axis1=-2, axis2=-1) / 2, np.linalg.det(A)
     return 0.5 / (mean.real + np.abs(np.sqrt(mean**2 - det).real)).max()
 

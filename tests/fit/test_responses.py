@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 import ffrobot
 from ffrobot.common.errors import InputError
-from ffrobot.fit.frf_fit import fit_receptances, stacked, unstacked
+from ffrobot.fit.frf import fit_receptances, stacked, unstacked
 from ffrobot.fit.frf_measured import Direction, MeasuredPose, MeasuredResponse, ResponseTest, read_tests
 
 LINES = np.linspace(2.0, 60.0, 200)  # Hz
@@ -92,6 +92,15 @@ def test_parameters_that_tests_do_not_see_are_named(case):
         fit_receptances(lambda x: [equations(x)], ["k1", "k2"], 1.1 * np.array(truth), [measured(H[:, :, 0])])
 
 
+def write_table(path, lines, columns):
+    """The CSV table of FRFs (F,) by the texts of their ends."""
+    rows = ["frequency,force,response,real,imaginary"]
+    for (force, response), H in columns.items():
+        pairs = zip(lines.tolist(), H.tolist(), strict=True)
+        rows += [f"{f!r},{force},{response},{h.real!r},{h.imag!r}" for f, h in pairs]
+    path.write_text("\n".join(rows))
+
+
 POSES = [[0.0, 0.0, 0.2, -0.4, 0.9, 0.3, 0.5, 0.1], [0.0, 0.0, -0.5, 0.1, 0.3, -0.4, 0.8, 0.2]]
 
 
@@ -100,12 +109,8 @@ def robot_tests(folder, start, poses=POSES, lines=60):
     frequency, tests = np.linspace(3.0, 100.0, lines), []
     for k, pose in enumerate(poses):
         H = receptance(ARM, np.array(pose), np.array(TOOL), frequency) * -((2 * np.pi * frequency[:, None, None]) ** 2)
-        rows = ["frequency,force,response,real,imaginary"]
-        for j, force in enumerate("xyz"):
-            for i, response in enumerate("xyz"):
-                pairs = zip(frequency.tolist(), H[:, i, j].tolist(), strict=True)
-                rows += [f"{f!r},tool/{force},tool/{response},{h.real!r},{h.imag!r}" for f, h in pairs]
-        (folder / f"pose{k}.csv").write_text("\n".join(rows))
+        ends = {(f"tool/{'xyz'[j]}", f"tool/{'xyz'[i]}"): H[:, i, j] for i, j in np.ndindex(3, 3)}
+        write_table(folder / f"pose{k}.csv", frequency, ends)
         joints = {joint.name: float(q) for joint, q in zip(ARM, pose, strict=True)}
         tests.append({
             "name": f"pose {k}", "file": f"pose{k}.csv", "unit": "m/s²/N", "points": {"tool": "body7.end"},
@@ -152,9 +157,7 @@ def test_modulus_and_damping_of_a_link_from_the_modes_of_a_clamped_beam(tmp_path
     lines = np.linspace(20.0, 900.0, 300)
     w = 2 * np.pi * lines[:, None]
     H = (4 / (rho * area * L) / (modes**2 - w**2 + 2j * zeta * modes * w)).sum(axis=1)
-    pairs = zip(lines.tolist(), H.tolist(), strict=True)
-    rows = [f"{f!r},arm.tip/y,arm.tip/y,{h.real!r},{h.imag!r}" for f, h in pairs]
-    (tmp_path / "tip.csv").write_text("\n".join(["frequency,force,response,real,imaginary", *rows]))
+    write_table(tmp_path / "tip.csv", lines, {("arm.tip/y", "arm.tip/y"): H})
     (tmp_path / "tests.toml").write_text(tomli_w.dumps({"test": [{"name": "tip", "file": "tip.csv", "unit": "m/N"}]}))
     link = beam_link(L, tube(0.02, 0.016), 20, nu=None, name="arm", modes={"count": 6, "family": "in-plane-bending"})
     link["material"] = {"youngs_modulus": 60e9, "density": rho}
@@ -172,9 +175,7 @@ def arm_in_gravity(folder, stiffness, damping):
     for k, start in enumerate((-1.1, 0.9)):
         q = brentq(lambda q, start=start: 300.0 * (q - start) + torque * np.cos(q), start - 1.0, start + 0.1)
         H = (length * np.cos(q)) ** 2 / (300.0 - torque * np.sin(q) - inertia * w**2 + 2j * w)
-        pairs = zip(lines.tolist(), H.tolist(), strict=True)
-        rows = [f"{f!r},arm.tip/y,arm.tip/-y,{-h.real!r},{-h.imag!r}" for f, h in pairs]
-        (folder / f"{k}.csv").write_text("\n".join(["frequency,force,response,real,imaginary", *rows]))
+        write_table(folder / f"{k}.csv", lines, {("arm.tip/y", "arm.tip/-y"): -H})
         tests.append({"name": f"{k}", "file": f"{k}.csv", "unit": "m/N", "pose": {"joints": {"a": start}}})
     (folder / "tests.toml").write_text(tomli_w.dumps({"test": tests}))
     points = {"root": [0.0, 0.0], "tip": [length, 0.0]}
@@ -202,9 +203,7 @@ def test_payload_from_a_mobility(tmp_path):
     payload = [{"point": "arm.tip", "mass": 1.0}]
     files[0].write_text(tomli_w.dumps(scene | {"gravity": [0.0, 0.0], "payload": payload}))
     H = 1e3j * w * 0.7**2 / (300.0 - (0.3 + 8.0 * 0.4**2 + 2.5 * 0.7**2) * w**2 + 2j * w)
-    pairs = zip((w / (2 * np.pi)).tolist(), H.tolist(), strict=True)
-    rows = [f"{f!r},arm.tip/y,arm.tip/y,{h.real!r},{h.imag!r}" for f, h in pairs]
-    (tmp_path / "0.csv").write_text("\n".join(["frequency,force,response,real,imaginary", *rows]))
+    write_table(tmp_path / "0.csv", w / (2 * np.pi), {("arm.tip/y", "arm.tip/y"): H})
     files[1].write_text(tomli_w.dumps({"test": [{"name": "one", "file": "0.csv", "unit": "mm/s/N"}]}))
     fit = ffrobot.fit_responses(*files, ["joint.a.stiffness", "joint.a.damping", "payload.0.mass"])
     np.testing.assert_allclose(fit.value, [300.0, 2.0, 2.5], rtol=1e-6)
@@ -244,9 +243,7 @@ def test_files_of_three_kinds_have_the_same_frfs(tmp_path):
     ends = {"force": ["1/z", "1/z"], "response": ["1/z", "2/-x"]}
     padded = {name: np.array(texts) for name, texts in ends.items()}  # with blanks, as char arrays have them
     savemat(tmp_path / "b.mat", {"frequency": lines, "H": H / 9.80665} | padded)
-    rows = [f"{f!r},1/z,{to},{h.real!r},{h.imag!r}" for to, of in zip(("1/z", "2/-x"), H.T, strict=True)
-            for f, h in zip(lines.tolist(), of.tolist(), strict=True)]  # fmt: skip
-    (tmp_path / "c.csv").write_text("\n".join(["frequency,force,response,real,imaginary", *rows]))
+    write_table(tmp_path / "c.csv", lines, {("1/z", to): of for to, of in zip(("1/z", "2/-x"), H.T, strict=True)})
     for name, unit in (("a.uff", {}), ("b.mat", {"unit": "g/N"}), ("c.csv", {"unit": "m/s²/N"})):
         (tmp_path / "tests.toml").write_text(table(file=name, band=[2.0, 15.0], **unit))
         (pose,) = read_tests(tmp_path / "tests.toml")
@@ -345,18 +342,12 @@ def test_coherence_outside_the_band_does_not_count(tmp_path):
 def test_poses_and_points_that_the_robot_has_not(tmp_path):
     files = robot_tests(tmp_path, ARM, lines=3)
     text = files[1].read_text()
+    without = {"test": [{key: of for key, of in one.items() if key != "pose"} for one in tomllib.loads(text)["test"]]}
     for wrong, expected in (
         (text.replace("waist", "wast"), r'hammer.toml: test "pose 0": pose:\n.*found "wast" \(did you mean "waist"'),
         (text.replace("body7.end", "body7.ned"), r'test "pose 0": expected one of .* found "body7.ned"'),
+        (tomli_w.dumps(without), 'test "pose 0": pose: expected one for each of several tests'),
     ):
         files[1].write_text(wrong)
         with pytest.raises(InputError, match=expected):
             ffrobot.fit_responses(*files, ["joint.waist.stiffness"])
-
-
-def test_several_tests_need_poses(tmp_path):
-    (tmp_path / "a.csv").write_text(HEADER + "5.0,1/x,1/x,1e-3,0.0,0.9\n")
-    one = {"name": "one", "file": "a.csv", "unit": "g/N"}
-    (tmp_path / "tests.toml").write_text(tomli_w.dumps({"test": [one, one]}))
-    with pytest.raises(InputError, match='test "one": pose: expected one for each of several tests'):
-        read_tests(tmp_path / "tests.toml")

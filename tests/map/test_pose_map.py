@@ -297,7 +297,7 @@ def test_stable_depth_of_cut_is_that_of_the_response(arm, tmp_path):
     J, K, D = J @ modes, modes.T @ K @ modes, modes.T @ D @ modes
     G = J @ np.linalg.solve(K + 1j * w * D - w**2, np.broadcast_to(J.T, (len(w), *J.T.shape)))
     feeds = milling.feeds(np.eye(3))[:, :, :2]
-    depth = min(0.5 / np.linalg.eigvals(milling.cutter.average @ E @ G @ E.T).real.max() for E in feeds)
+    depth = min(0.5 / np.linalg.eigvals(milling.average @ E @ G @ E.T).real.max() for E in feeds)
     assert found.values["joints_compliant/milling_depth"][1] == pytest.approx(depth, rel=1e-3)
     assert "milling_compliant" in quantities(found)
 
