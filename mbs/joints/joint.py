@@ -181,6 +181,7 @@ class JointRecord(Record):
     loop_equations: ClassVar[tuple[LoopEquation, ...] | None] = None  # None where it cannot close a loop
     along: ClassVar[tuple[Along, ...]] = ()  # its coordinates where it does, in the scene's order
     locates: ClassVar[bool] = True
+    exchanged: ClassVar[Array] = np.eye(3)  # its axes on exchanged sides, columns, in those before
     """Whether it fixes the place of one body on the other; the initial guess goes along such joints first."""
 
     @model_validator(mode="after")
@@ -247,11 +248,6 @@ class JointRecord(Record):
     def triads(self) -> tuple[Array, Array]:
         """Return the joint's axes (3, 3), columns, on its first and its second side, in axes of the sections."""
         return np.eye(3), self.orientation.T
-
-    def outward_triads(self, backwards: bool) -> tuple[Array, Array]:
-        """The triads on the inner side and on the outer one, which is the first of `between` if `backwards`."""
-        first, second = self.triads()
-        return (second, first) if backwards else (first, second)
 
     def turned_around(self, coordinates: Array) -> Array:
         """Return coordinates (…, k), rad or m, with the sides exchanged: of the first on the second."""

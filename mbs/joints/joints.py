@@ -108,7 +108,6 @@ class CylindricalJoint(AxialJoint):
 
 
 SQUARE = 1e-6  # largest cosine between the two axes at zero coordinates
-EXCHANGED = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # x and y change places
 
 
 class UniversalJoint(AxialJoint):
@@ -127,6 +126,7 @@ class UniversalJoint(AxialJoint):
     freedoms = 2
     loop_equations = (POINT, NOT_TURNED)
     along = (Along("turn", 0, 1), Along("turn", 1, 0, of_outer=True))
+    exchanged = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # x and y change places
 
     @model_validator(mode="after")
     def _axes_are_square(self) -> Self:
@@ -147,11 +147,6 @@ class UniversalJoint(AxialJoint):
         z = unit(np.cross(x, y))
         first = np.stack([x, np.cross(z, x), z], axis=1)
         return first, self.orientation.T @ first
-
-    def outward_triads(self, backwards: bool) -> tuple[Array, Array]:
-        """Triads of both sides from root to tip; if `backwards` its axes change places: x is the inner side's."""
-        inner, outer = super().outward_triads(backwards)
-        return (inner @ EXCHANGED, outer @ EXCHANGED) if backwards else (inner, outer)
 
     def turned_around(self, coordinates: Array) -> Array:
         """Return coordinates (…, 2), rad, of the reversed joint: both negative, the second first."""

@@ -12,10 +12,11 @@ import numpy as np
 from ...common.arrays import Array, null_space
 from ...common.errors import InputError, quoted
 from ...common.structs import struct
-from ..model.gears import gear_matrices, with_prescribed_motors
+from ..model.gears import with_prescribed_motors
 from ..model.known_motion import State
 from ..model.model import Model
 from ..model.system import MultibodySystem
+from ..model.tree import KinematicTree
 from ..posture.redundancy import resolved
 from ..posture.start import relaxed_gears, undeformed_posture
 
@@ -61,6 +62,17 @@ def vibrations_of(model: Model, unconstrained: MultibodySystem, t: float, q: Arr
     omega, shape = np.sqrt(squares), sizes[:, None] * shape
     ratio = np.einsum("in,ij,jn->n", shape, D, shape) / (2 * omega)
     return Vibrations(omega, ratio, shape, K)
+
+
+def gear_matrices(tree: KinematicTree, q: Array) -> tuple[Array, Array]:
+    """Return K (N·m/rad, N/m) and D (N·m·s/rad, N·s/m), (n_v, n_v), of compliant gears at q (n_q,)."""
+    K, D = np.zeros((2, tree.n_v, tree.n_v))
+    for gear in tree.gears:
+        twist = np.zeros(tree.n_v)
+        twist[gear.motor.v.start], twist[gear.joint.v.start] = 1.0, -gear.sign
+        K += gear.spring.slope(gear.twist(q, np.zeros(tree.n_v))[0]) * np.outer(twist, twist)
+        D += gear.damping * np.outer(twist, twist)
+    return K, D
 
 
 def elastic_shapes(M: Array, K: Array, C_v: Array) -> tuple[Array, Array]:

@@ -131,14 +131,3 @@ def _of_frictions(tree: KinematicTree, v: Array, of: Callable[[Friction, Array],
         for column, friction in zip(range(node.v.start, node.v.stop), node.joint.frictions, strict=False):
             force[:, column] = of(friction, v[:, column])
     return force
-
-
-def gear_matrices(tree: KinematicTree, q: Array) -> tuple[Array, Array]:
-    """Return K (N·m/rad, N/m) and D (N·m·s/rad, N·s/m), (n_v, n_v), of compliant gears at q (n_q,)."""
-    K, D = np.zeros((2, tree.n_v, tree.n_v))
-    for gear in tree.gears:
-        twist = np.zeros(tree.n_v)
-        twist[gear.motor.v.start], twist[gear.joint.v.start] = 1.0, -gear.sign
-        K += gear.spring.slope(gear.twist(q, np.zeros(tree.n_v))[0]) * np.outer(twist, twist)
-        D += gear.damping * np.outer(twist, twist)
-    return K, D

@@ -101,9 +101,9 @@ class KinematicTree:
             backwards = carrier is not None and joint.between[0] == carrier.own
             inner, outer = self.section(GROUND), Section(number, "", AXES, np.zeros(3))
             if carrier is not None:
-                triads = joint.outward_triads(backwards)
-                inner = self.section(carrier.other, triads[0], joint.at)
-                outer = self.section(carrier.own, triads[1])
+                inner, outer = self.sides(joint)
+            if backwards:
+                inner, outer = (side._replace(triad=side.triad @ joint.exchanged) for side in (outer, inner))
             nodes.append(node_at(q, v, body, joint, inner, outer, backwards=backwards))
             q, v = nodes[-1].p_q.stop, nodes[-1].p_v.stop
         self.nodes = tuple(nodes)
