@@ -111,7 +111,7 @@ class _Trials:
             try:
                 timed = run(with_analysis(scene, self.name, tolerance=tolerance), self.name, self.budget, self.display)
             except FfrobotError as error:  # such as more modes than half the mesh has
-                timed = TimedRun("", "refused", 0.0, 0, 0, 0, {}, {}, str(error).splitlines()[0])
+                timed = TimedRun("", "refused", why=str(error).splitlines()[0])
             self.done[key] = timed
         return self.done[key]
 

@@ -75,12 +75,14 @@ class TimedRun:
 
     integrator: str  # the one that ran; for "auto" the one chosen
     status: str  # "completed", "over budget", "refused", or how the integration failed
-    seconds: float  # integration and outputs, of the analysis and of those whose actuation it takes
-    steps: int
-    rejected: int
-    evaluations: int
-    histories: Histories = field(repr=False)
-    bodies: Mapping[str, str] = field(repr=False)  # SHA-256 of the modal body file of each flexible body
+    seconds: float = 0.0  # integration and outputs, of the analysis and of those whose actuation it takes
+    steps: int = 0
+    rejected: int = 0
+    evaluations: int = 0
+    histories: Histories = field(default_factory=dict, repr=False)
+    bodies: Mapping[str, str] = field(
+        default_factory=dict, repr=False
+    )  # SHA-256 of the modal body file of each flexible body
     why: str | None = None  # it was refused
 
     @property
