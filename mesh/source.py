@@ -31,7 +31,7 @@ _LISTED = 5  # concentrated masses, one by one
 
 @struct
 class PointMass:
-    """A concentrated mass, which a link can have on an interface."""
+    """A concentrated mass, which a link can have on an interface, in the units of its file."""
 
     label: str  # what the file calls it, and where
     mass: float  # in the file's unit, kg where lengths are in m
@@ -40,7 +40,7 @@ class PointMass:
 
 @struct
 class RawMesh:
-    """Mesh as read from a source."""
+    """Mesh as read from a source, in its unit of length."""
 
     points: Array  # (p, 3) in the source's unit and axes; some may belong to no volume
     blocks: Sequence[tuple[str, Integers]]  # of volume elements: type, (c, v) points
@@ -74,7 +74,7 @@ class MeshBlocks:
         self.count += len(cells)
 
     def add_surfaces(self, corners: Integers, groups: Groups) -> None:
-        """Triangles or quadrilaterals (k, 3 or 4)."""
+        """Add triangles or quadrilaterals (k, 3 or 4)."""
         self.surfaces.append(corners)
         for name, members in groups:
             self.facets[name].append(corners[members])

@@ -42,11 +42,14 @@ COMPONENTS: Mapping[Family, tuple[int, ...]] = {
 
 @struct
 class Inertia:
-    """M and strain energy of a finite element model with m degrees of freedom, of which a process may own a part."""
+    """M and strain energy of a finite element model with m degrees of freedom, of which a process may own a part.
 
-    mass: Callable[[Array], Array]  # M U of U (m, k)
-    energy: Callable[[Array], Array]  # (k, k) UᵀKU, free of the round-off errors of an assembled K
-    total: Callable[[Array], Array]  # sum of an array over all processes
+    `mass` returns M U of displacements U (m, k), `energy` UᵀKU (k, k), `total` the sum of an array over all processes.
+    """
+
+    mass: Callable[[Array], Array]
+    energy: Callable[[Array], Array]  # free of the round-off errors of an assembled K
+    total: Callable[[Array], Array]
 
     def without(self, X: Array, U: Array) -> Array:
         """U less its part in X (m, n), XᵀMX = I; twice, for orthogonality to round-off."""

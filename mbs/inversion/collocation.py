@@ -83,7 +83,7 @@ class Problem:
 class Found:
     """p(t) as piecewise polynomials, (n,) values; whether Newton's method converged, and its iterations.
 
-    `worst` is the time at which its last step was largest, or the residual no number.
+    `worst` is the time, s, at which its last step was largest, or the residual was NaN.
     """
 
     curve: PPoly

@@ -27,7 +27,7 @@ CENTRE = 1e-6  # |Re s| / |s| of zeros that count as undamped
 
 @struct
 class LinearDynamics:
-    """M δp̈ + D δṗ + K δp = 0 of the internal dynamics at `times` (N,): each (N, n, n)."""
+    """M δp̈ + D δṗ + K δp = 0 of the internal dynamics at `times` (N,), s: each (N, n, n), SI units."""
 
     times: Array
     M: Array
@@ -45,7 +45,7 @@ class LinearDynamics:
 
 
 def linear_dynamics(servo: Servo, times: Array, p: Array, v: Array, a: Array) -> LinearDynamics:
-    """Derivatives of r at N nodes: times (N,), p, ṗ, p̈ (N, n)."""
+    """Derivatives of r at N nodes: times (N,), s, p, ṗ, p̈ (N, n)."""
     return LinearDynamics(times, *(x[:, : p.shape[1]] for x in servo.slopes(times, p, v, a)))
 
 
@@ -177,7 +177,7 @@ class Linearisation:
 
 
 def shape_along(servo: Servo, times: Array) -> Array:
-    """P (N, n) of links that follow their loads at `times` (N,) as springs would: r(t, p, 0, 0) = 0.
+    """P (N, n) of links that follow their loads at `times` (N,), s, as springs would: r(t, p, 0, 0) = 0.
 
     Raises `SolveError` where they are too soft for that.
     """
@@ -187,7 +187,7 @@ def shape_along(servo: Servo, times: Array) -> Array:
 
 
 def linearise(servo: Servo, end: float, samples: int = SAMPLES) -> Linearisation:
-    """About `shape_along`. Raises `SolveError` as it does."""
+    """The linear dynamics about `shape_along`, up to `end`, s. Raises `SolveError` as that does."""
     times = np.linspace(0.0, end, samples)
     p = shape_along(servo, times)
     dynamics = linear_dynamics(servo, times, p, 0 * p, 0 * p)

@@ -69,9 +69,9 @@ class LinearMechanism:
 
 
 class LinearEquations:
-    """Posture-independent part of linearization: free mechanism, given forces along s, and loads.
+    """Equations of motion, SI units, that `at` makes linear in independent coordinates s about any posture.
 
-    `model` has no rows of trajectories; its gears give where its tree has them. Independent are the motors' coordinates
+    `model` has no trajectories; its gears are compliant where its tree says so. Independent are motors' coordinates
     where loops leave them so, then other joint coordinates, and modes, those first that the loops determine worst at
     `q` (QR with pivoting). `points` ("BODY.POINT") are in- and outputs; a mapping says where each is in the model,
     where that is another body's point (of a link in pieces).

@@ -35,7 +35,7 @@ class Command(NamedTuple):
 
 
 class Replayed(NamedTuple):
-    """Time-dependent inputs found by an earlier analysis, and the generalized forces that each produces."""
+    """Inputs that an earlier analysis found: numbers over time from `source`, generalized forces of a unit of each."""
 
     source: ForceSource  # of the numbers, at any time
     commands: tuple[Command, ...]  # what a unit of each does; of those at points nothing

@@ -36,7 +36,7 @@ SAME = 1e-6  # rad: angles that differ by less
 
 
 class StartPosture(NamedTuple):
-    """Initial posture of a robot, with the guess that selects it.
+    """Initial posture of a robot, rad and m, with the guess that selects it.
 
     `q` (n_q,); `guess`, the line of [initial] that chooses it, and `guesses`, its coordinates by joint; `away` (rad),
     the largest turn to it; `branch`, how its joints stand, by name (see `branch_names`).
@@ -136,7 +136,7 @@ def in_words(branch: Mapping[str, Word]) -> str:
 
 
 def is_so(model: Model, q: Array, node: Node, word: Word) -> bool:
-    """Whether the word is right of a joint of the tree in the posture q (n_q,), rad and m."""
+    """Whether `word`, such as "up" or "flip", describes the joint of `node` in the posture q (n_q,), rad and m."""
     if word in ("up", "down"):
         return _above(model, q, node) == (word == "up")
     if word in ("left", "right"):

@@ -1,4 +1,4 @@
-"""The record of a run: motion, forces, how it went, and what only its kind of analysis finds."""
+"""The record of a run: motion, forces, how it went, and what only its kind of analysis finds. SI units."""
 
 from __future__ import annotations
 
@@ -215,7 +215,7 @@ class Run:
 
     @property
     def arithmetic(self) -> np.errstate[Any]:
-        """For what follows from a run: one that ended early, or diverges, may grow beyond all numbers."""
+        """Context that ignores overflow where a run ended early or diverges: what follows from it may be infinite."""
         is_calm = self.status == "completed" and np.abs(self.v).max(initial=0.0) < HUGE
         return np.errstate() if is_calm else np.errstate(over="ignore", invalid="ignore")
 

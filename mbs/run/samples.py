@@ -89,9 +89,9 @@ def telling(times: Array, values: Array, sizes: Array) -> Indices:
 
 
 def about_highest(some: Indices, quantities: Array, beside: int = 1) -> Indices:
-    """All samples about the highest of `quantities` (T, columns), which were found at `some` (T,).
+    """Numbers of all samples about the highest of `quantities` (T, columns), which are known at samples `some` (T,).
 
-    From `beside` of these before each to as many behind.
+    They reach from `beside` of `some` before each maximum to as many after it.
     """
     tops = sorted({k for column in np.abs(quantities).T for k in _highest(column)})
     about = [np.arange(some[max(k - beside, 0)], some[min(k + beside, len(some) - 1)] + 1) for k in tops]

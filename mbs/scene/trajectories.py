@@ -78,7 +78,7 @@ class Shaper(Record):
 
 
 class MotionKeys(Referring):
-    """Keys of the motion of a trajectory."""
+    """Keys of the motion of a trajectory: when it passes which places, and how fast."""
 
     via: Annotated[tuple[Place, ...], OfPlaces] | None = None
     """Waypoints from rest to rest, the first at t = 0: of points (m), or values of what turns or slides."""

@@ -108,7 +108,7 @@ class Iterate:
     moved: float = np.inf
 
     def tracked(self, steps: Steps) -> Tracked:
-        """As piecewise polynomials."""
+        """Return this as piecewise polynomials."""
         assert self.found is not None
         breaks, steps.sigma = steps.breaks, self.share
         cost = steps.cost(self.found)
@@ -382,7 +382,7 @@ class Steps:
         return np.concatenate(rows, axis=1), np.concatenate(most, axis=1)
 
     def prices(self, found: Minimum) -> dict[str, Array]:
-        """Those of `Tracked`, by the multipliers of the last program, whose rows are shares of limits."""
+        """`Tracked.prices`, by the multipliers of the last program, whose rows are shares of limits."""
         prices = {name: np.zeros(range.shape[1]) for name, range in self.asked.ranges.items()}
         for name, (part, limit, owners) in self.rows.items():
             kind = name.split()[0].replace("end", "voltage")

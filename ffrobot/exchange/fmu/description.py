@@ -82,7 +82,7 @@ def finished(
     references: Iterable[int],
     structure: Mapping[str, Mapping[int, list[int]]],
 ) -> bytes:
-    """The file (UTF-8), with units, log, experiment, variables and structure after what `root` has.
+    """The modelDescription.xml (UTF-8), with units, log, experiment, variables and structure after what `root` has.
 
     `groups` are those of `ATTRIBUTES`; `references` are the value references of all variables in order. `structure` has
     by its element the variables that each variable depends on, by their numbers from 1.
