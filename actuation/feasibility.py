@@ -1,4 +1,4 @@
-"""Feasibility: requirements on patches and motors against their limits, and single changes that would suffice."""
+"""Feasibility: requirements on patches and motors against their limits, and single changes that suffice. SI units."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Motors of a catalog that suffice for the task of a joint."""
+"""Motors of a catalog that suffice for the task of a joint. SI units."""
 
 from __future__ import annotations
 

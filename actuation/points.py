@@ -1,4 +1,4 @@
-"""Actuation points (Shabana 2022, Eqs. 5–10): generalized driving forces of a body as forces along x, y, z.
+"""Actuation points (Shabana 2022, Eqs. 5–10): generalized driving forces of a body as forces along x, y, z. SI units.
 
 Forces F_a at points of a body are generalized forces L_a F_a, with a column [e; u × e; Φᵀe] for a unit force along e at
 u = x + Φp: on R and on the rotation, both in axes of the body, and on its modes. Q_a are the generalized forces of
@@ -70,7 +70,7 @@ class ActuationPoints(Record):
 
 @struct
 class PointSet:
-    """Components of force at points of one body."""
+    """Components of force at points of one body; SI units."""
 
     body: str  # its name
     names: tuple[str, ...]  # of the points, one for each component
@@ -191,7 +191,7 @@ def _point(key: str, place: Place, body: ModalBody | None, spatial: Body) -> Bod
 
 @struct
 class PointForces:
-    """Forces at the actuation points of one body over time."""
+    """Forces at the actuation points of one body over time; `unmet`: the generalized ones that they leave."""
 
     force: Array  # (T, c) N along each component, body axes
     # (T, 6 + n) Q_a − L_a F_a on R and on the rotation, both in axes of the body, and on p: N, N·m, N/√kg; in the plane

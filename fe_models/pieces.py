@@ -25,10 +25,10 @@ ON_A_CUT = 1e-9  # of the length
 
 @struct
 class CutLink:
-    """A link in pieces."""
+    """A link in pieces that begin at `starts`, m from the root."""
 
     tables: tuple[LinkTable, ...]  # the link of each piece, from the root to the tip
-    starts: tuple[float, ...]  # where each begins, m from the root
+    starts: tuple[float, ...]
     places: Mapping[str, tuple[int, str]]  # of each interface, and of "mid", the number of the piece and the name there
 
 

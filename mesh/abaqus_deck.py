@@ -310,7 +310,10 @@ def _of_length(keyword: Keyword, length: int) -> Iterator[tuple[list[str], str]]
 
 @dataclass
 class Instance:
-    """A part in the assembly: `place` of its keyword, turned by `rotation` about `center` after it has been `moved`."""
+    """A part in the assembly: `place` of its keyword, turned by `rotation` about `center` after it has been `moved`.
+
+    `moved` and `center` (3,) have the unit of the deck.
+    """
 
     scope: Scope
     place: str = ""

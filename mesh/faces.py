@@ -33,7 +33,7 @@ _LISTED = 12
 
 @struct
 class PartBoundary:
-    """The boundary of a part."""
+    """The boundary of a part; SI units."""
 
     points: Array  # (p, 3) of the part
     facets: Integers  # (b, 3 or 4) corners, counter-clockwise seen from outside
@@ -65,7 +65,7 @@ class PartBoundary:
 
 @struct
 class SmoothFace:
-    """A smooth face: its `facets` (k,) of the boundary, `center` (3,), `area`, mean outward `normal` (3,), `axis`.
+    """A smooth face: its `facets` (k,) of the boundary, `center` (3,), m, `area`, m², mean outward `normal`, `axis`.
 
     The mean normal of a bore or shaft vanishes; its `axis` (3,), which all normals are perpendicular to, takes its
     place. `axis` is None where there is none.

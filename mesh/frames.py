@@ -1,4 +1,4 @@
-"""Local axes that files of meshes give their nodes in: rectangular, cylindrical, spherical."""
+"""Local axes, lengths in the file's unit, in which files of meshes have nodes: rectangular, cylindrical, spherical."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ Tags = NDArray[np.int32]
 
 @struct
 class PartMesh:
-    """A solid part, meshed."""
+    """A solid part, meshed, in m."""
 
     points: Array  # (p, 3) in m, in the link's frame once `placed`
     cells: Integers  # (c, v) points of each cell, in gmsh's order of nodes
@@ -76,7 +76,7 @@ def boundary_facets(part: PartMesh) -> tuple[Integers, Integers]:
 
 
 def facet_geometry(points: Array, facets: Integers) -> tuple[Array, Array, Array]:
-    """Centroid (f, 3), unit outward normal (f, 3) and area (f,) of straight facets; quadrilaterals as two triangles."""
+    """Centroid (f, 3), m, unit outward normal (f, 3), area (f,), m², of facets; quadrilaterals as two triangles."""
     fan = [facets[:, [0, k, k + 1]] for k in range(1, facets.shape[1] - 1)]
     vectors = [np.cross(points[t[:, 1]] - points[t[:, 0]], points[t[:, 2]] - points[t[:, 0]]) / 2 for t in fan]
     areas = [np.linalg.norm(vector, axis=1) for vector in vectors]

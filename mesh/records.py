@@ -1,4 +1,4 @@
-"""The tables of a link file that say what a link looks like: geometry, mesh, places. No mesh library is loaded.
+"""Tables of a link file for geometry, mesh and places, SI units. No mesh library is loaded.
 
 A stepped beam gives `[[geometry.segment]]` tables in place of `section`: each with the `section` that holds from the
 end of the segment before (from the root, for the first) to `until` (m from the root); the last one ends at `length`.

@@ -36,7 +36,7 @@ _COINCIDENT = 1e-6
 
 @struct
 class Surface:
-    """Boundary triangles of the whole part, equal on all processes, with the points that each process knows."""
+    """Boundary triangles of the whole part, m, equal on all processes, with the points that each process knows."""
 
     points: Array  # (p, 3) in m; the order does not depend on the number of processes
     triangles: Integers  # (t, 3) rows of `points`, counter-clockwise seen from outside
@@ -143,7 +143,7 @@ MeshTags = Any  # dolfinx 0.5 and 0.9 name this class differently
 
 @struct
 class SolidMesh:
-    """A solid part as the finite element models take it."""
+    """A solid part as the finite element models take it, in m."""
 
     mesh: Mesh  # of tetrahedra or hexahedra, distributed, without ghost cells; coordinates in m in the link's frame
     part: PartMesh  # its names and their tags; without points and cells

@@ -91,7 +91,7 @@ class StateSpace:
 
 @struct
 class SampledController(StateSpace):
-    """Controllers of a loop with their observer: from readings to commands, off the reference.
+    """Controllers of a loop with their observer: from readings to commands, off the reference. SI units.
 
     Readings are those of sensors, behind their filters and delays; commands are those before limits.
     """
@@ -467,7 +467,7 @@ def _finite(A: Array, E: Array, largest: float) -> tuple[ComplexArray, Array]:
 class SampledModel:
     """x(k+1) = A x(k) + B u(k) of a model with inputs that are constant between samples and act after a delay.
 
-    Commands that are on their way are states behind those of the model, oldest first.
+    SI units. Commands that are on their way are states behind those of the model, oldest first.
     """
 
     A: Array

@@ -1,4 +1,4 @@
-"""The sampled loop that the core calls, and the record of a run: samples, metrics, margins, advice."""
+"""The sampled loop that the core calls, and the record of a run: samples, metrics, margins, advice. SI units."""
 
 from __future__ import annotations
 

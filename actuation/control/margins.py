@@ -1,4 +1,4 @@
-"""Stability of sampled loops by the linear model, and gains for joint PD controllers to start with.
+"""Stability of sampled loops by the linear model, and gains for joint PD controllers to start with. SI units.
 
 Commands are constant between samples and begin `delay` after their reading. With the model sampled exactly (Åström and
 Wittenmark, Computer-Controlled Systems, sec. 2.3) and the states of the controllers, the loop x(k+1) = F x(k) is stable

@@ -71,7 +71,7 @@ class Metrics:
 
 @struct
 class LoopMotion:
-    """Motion of a closed loop, at outputs and between."""
+    """Motion of a closed loop, at outputs and between; SI units."""
 
     time: Array  # (T,) s
     error: Array  # (T, d) m, of the tip from its place

@@ -1,4 +1,4 @@
-"""Observers: estimates of what no sensor reads, by a sampled model of the robot about its reference.
+"""Observers: estimates of what no sensor reads, by a sampled model of the robot about its reference. SI units.
 
     x̂ = x̂⁻ + L (y − C x̂⁻),    x̂⁻(k+1) = A x̂ + B u + M (y − C x̂⁻)
 
@@ -313,7 +313,7 @@ class Observed:
         return found
 
     def record(self, truth: Mapping[str, Array]) -> Estimates:
-        """Return the estimates at the samples taken, compared with the true values (taken,) by name."""
+        """Return the estimates at the samples taken, compared with the true values (taken,), SI units, by name."""
         p, tip = self._p, self.tip
         taken = len(next(iter(truth.values())))
         first = self.schedule.observers[0]

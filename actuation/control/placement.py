@@ -1,4 +1,4 @@
-"""The analysis `kind = "placement"`: the centers of patches on a link that do most.
+"""The analysis `kind = "placement"`: the centers of patches on a link that do most. SI units.
 
 By what patches reach, by the voltages a path takes, or by what they tell of the tip. Mass and stiffness of patches,
 where the scene adds them to the link, stay where the scene has the patches.

@@ -218,7 +218,7 @@ class GainsObserver(ObserverRecord):
 
     @property
     def matrices(self) -> tuple[Any, Any, Any, Any]:
-        """A, B, C and gain. Raises `InputError` where the file does not have them."""
+        """A (n, n), B (n, inputs), C (outputs, n), gain (n, outputs); raises `InputError` where the file lacks one."""
         if self.file is None:
             return self.A, self.B, self.C, self.gain
         from .linear_model import read_arrays

@@ -39,7 +39,7 @@ def rigid_freedom(model: Model) -> int:
 
 
 class RigidArm:
-    """Torques τ(γ, γ̇, γ̈) of all motors with rigid links, by the core, rotors and friction too, without loads.
+    """Torques τ(γ, γ̇, γ̈), SI, of all motors with rigid links, by the core, rotors and friction too, without loads.
 
     They are the multipliers of γ = γ(t), affine in γ̈: one evaluation with γ̈ = 0, one for each motor. `q` (n_q,): the
     first configuration of `model`. Raises `InputError` where the motors do not fit.
@@ -136,7 +136,7 @@ class PatchSignals:
 
 @struct
 class ControlledRobot:
-    """Robot with motors and patches along the motion of an inverse analysis, about which it is linearized."""
+    """Robot, SI units, with motors and patches on the motion of an inverse analysis, about which it is linearized."""
 
     model: Model  # its constraint equations are those of loops alone, its gears do not give: see `linear`
     of_links: Mapping[str, LinkPatches]  # patches by link
@@ -278,7 +278,7 @@ def default_tip(model: Model) -> str:
 
 @struct
 class Setup:
-    """Data for making a controller."""
+    """Data for making a controller; SI units."""
 
     robot: ControlledRobot
     model: Model  # its equations of motion

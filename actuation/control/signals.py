@@ -1,4 +1,4 @@
-"""Readings of sensors by name, as in linear models: joints, motors, points, patches, modes."""
+"""Readings of sensors by name, as in linear models: joints, motors, points, patches, modes. SI units."""
 
 from __future__ import annotations
 

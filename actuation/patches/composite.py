@@ -1,4 +1,4 @@
-"""Patches as layers of their link: the composite section with its modes, what a volt does, what patches add.
+"""Patches as layers of their link: the composite section with its modes, what a volt does, what patches add. SI units.
 
 Under the strains e = (φ_z', u', φ_x', −φ_y') of the axis and a voltage V the layers at one place take the loads
 

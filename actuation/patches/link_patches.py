@@ -1,4 +1,4 @@
-"""Patches of a link: several layouts side by side, their reach, and voltages that they find together.
+"""Patches of a link: several layouts side by side, their reach, and voltages that they find together. SI units.
 
 Patches serve the modes of the families that some patch reaches: in-plane bending by patches on ±y, out-of-plane bending
 by those on ±z, torsion by fibers at an angle, the axial family by one named face. Voltages leave the modal forces on

@@ -1,4 +1,4 @@
-"""Piezoelectric patches on a link: what a volt does to its modal coordinates (Shabana 2022, Eqs. 14–17)."""
+"""Piezoelectric patches on a link: what a volt does to its modal coordinates (Shabana 2022, Eqs. 14–17). SI units."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The bare sections of a link under patches, and the loads of layers on them.
+"""The bare sections of a link under patches, and the loads of layers on them. SI units.
 
 Layers at the distance η from the axis strain as the section does,
 

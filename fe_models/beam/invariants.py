@@ -1,4 +1,4 @@
-"""Inertia shape integrals and geometric stiffness of a beam, from its fields at the stations.
+"""Inertia shape integrals and geometric stiffness of a beam, from its fields at the stations. SI units.
 
 The stations are the Gauss–Lobatto points of cubic elements, so values at stations *are* the degrees of freedom of
 the fields and every integral is a product with a mass matrix, without error.

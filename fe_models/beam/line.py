@@ -1,4 +1,4 @@
-"""Piecewise polynomials along the axis of a beam, and their exact integrals. NumPy and SciPy only."""
+"""Piecewise polynomials along the axis of a beam, and their exact integrals. NumPy and SciPy only. SI units."""
 
 from __future__ import annotations
 

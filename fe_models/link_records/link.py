@@ -1,4 +1,4 @@
-"""A whole link file as records: what stage 1 reads, checked key by key. `geometry.kind` picks beam or solid."""
+"""A link file as records, SI units: what stage 1 reads, checked key by key. `geometry.kind` picks beam or solid."""
 
 from collections.abc import Mapping
 from pathlib import Path

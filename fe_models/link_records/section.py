@@ -1,4 +1,4 @@
-"""Properties of beam cross sections, in the link frame: x along the axis, y in-plane, z out of plane."""
+"""Properties of beam cross sections, in the link frame: x along the axis, y in-plane, z out of plane. SI units."""
 
 from __future__ import annotations
 

@@ -68,7 +68,7 @@ INDEPENDENT = 1e-6  # singular values of interface coordinates, each scaled to 1
 def constraint_modes(omega2: Array, families: Sequence[str], interfaces: Mapping[str, Interface]) -> int:
     """Return how many of n modes are constraint modes (unit motions of interfaces); 0 if interfaces cannot move so.
 
-    For bodies of other programs, whose modes say no more than ω² (n,), families, and what they do at interfaces.
+    For bodies of other programs, whose modes say no more than ω² (n,), rad²/s², families, and how interfaces move.
     """
     families = [str(family) for family in families]
     moving = {k for family in FAMILIES if family in families for k in COMPONENTS[family]}
@@ -112,10 +112,11 @@ def interface_coordinates(
 def interface_loads(
     omega2: Array, families: Sequence[str], static: int, interfaces: Mapping[str, Interface]
 ) -> tuple[Array, dict[str, Array]]:
-    """The loads that bend a link into each of its n modes, as `attachment_modes.interface_loads` has them.
+    """W (n, n), rad²/s², and by interface loads (6, n), N and N·m, that bend a link into its n modes.
 
-    K φ = ω² M φ + B c of a fixed-interface mode with reactions c; K ψ = B c of a constraint mode. So in all modes the
-    inertia is that of fixed-interface modes N: KX = M X N Nᵀ Ω² + B c, and Xᵀ of it gives c.
+    As `attachment_modes.interface_loads`. K φ = ω² M φ + B c of a fixed-interface mode with reactions c; K ψ = B c of
+    a constraint mode. So in all modes the inertia is that of fixed-interface modes N: KX = M X N Nᵀ Ω² + B c, and Xᵀ of
+    it gives c.
     """
     coordinates = interface_coordinates(omega2, families, static, interfaces)
     W = coordinates.fixed @ (coordinates.fixed.T * omega2)

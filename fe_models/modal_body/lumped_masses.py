@@ -1,4 +1,4 @@
-"""Masses rigidly attached to interfaces (a hub, a motor, a gripper): what they add to a link. NumPy only.
+"""Masses rigidly attached to interfaces (a hub, a motor, a gripper): what they add to a link. NumPy only. SI units.
 
 A lump of mass m sits with its center at the interface x_I and has the inertia tensor J = diag(J_x, J_y, J_z) there. Its
 material points x_I + ξ move by Φ0 + φ × ξ, with translation Φ0 and rotation φ (3, n) of the interface, and
@@ -28,12 +28,12 @@ Of = TypeVar("Of", bound=Invariants)
 
 @struct
 class Lump:
-    """A mass on the interface `name`."""
+    """A mass, kg, with its inertia (3,), kg·m², on the interface `name`."""
 
     name: str
     at: Interface  # what the modes do there
-    mass: float  # m in kg
-    inertia: Array  # (3,) J_x, J_y, J_z about the interface, in kg·m²
+    mass: float
+    inertia: Array  # J_x, J_y, J_z about the interface
 
     @property
     def spread(self) -> Array:

@@ -39,7 +39,7 @@ class Integrals:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Invariants(Integrals):
-    """Integrals with the inertia of lines of mass about their axis, along which φ is the twist of the modes."""
+    """Integrals, SI units, with the inertia of lines of mass about their axis; φ is the twist of the modes there."""
 
     J_spin: float  # J_s = ∫ρI_p dx in kg·m²
     h_spin: Array  # (n,) h_s = ∫ρI_p φ dx
@@ -78,7 +78,7 @@ def _frozen(value: object) -> object:
 
 @struct
 class Interface(Frozen):
-    """Modes at one point of the axis, in the link's frame."""
+    """Modes at one point of the axis, in the link's frame; SI units."""
 
     position: Array  # (3,) in m, undeformed
     translation: Array  # (3, n) displacement of mode l in column l, in m per unit of its modal coordinate
@@ -89,7 +89,7 @@ class Interface(Frozen):
 
 @struct
 class Stations(Frozen):
-    """Points along the axis, ascending in x, at which the modes are known."""
+    """Points along the axis, ascending in x, at which the modes are known; SI units."""
 
     position: Array  # (k, 3) in m
     translation: Array  # (k, 3, n), as in `Interface`
@@ -112,7 +112,7 @@ class Stations(Frozen):
 
 @struct
 class PictureMesh(Frozen):
-    """Mesh of the link for pictures, with its mode shapes."""
+    """Mesh of the link for pictures, with its mode shapes; SI units."""
 
     points: Array  # (p, 3) in m
     cells: Integers  # (c, v) points of each cell
@@ -136,11 +136,11 @@ class StressPoint(Frozen):
 
 @struct
 class MeasuredValues(Frozen):
-    """Measured values of the modes, and the frequencies of the finite element model."""
+    """Measured values of the modes, and the frequencies, Hz, of the finite element model."""
 
     frequency: Integers  # (n,) 1 of modes whose `ModalBody.frequency` was measured, else 0
     damping_ratio: Integers  # (n,) likewise, of `ModalBody.damping_ratio`
-    computed_frequency: Array  # (n,) in Hz, of the finite element model
+    computed_frequency: Array  # (n,)
 
     def in_words(self) -> str:
         """Return which modes are measured as text, counted from 1."""
@@ -152,7 +152,7 @@ class MeasuredValues(Frozen):
 
 @struct
 class OutlinedPatches(Frozen):
-    """Piezoelectric patches whose outlines are edges of the mesh, on the faces at largest (top) and smallest y."""
+    """Piezoelectric patches whose outlines, m, are edges of the mesh, on the faces at largest (top) and smallest y."""
 
     edges: Array  # (k, 2) begin and end of each patch, m from the root
     width: float  # along z, in m

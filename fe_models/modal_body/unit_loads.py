@@ -57,7 +57,7 @@ def inertia_wrenches(x: Array, mass: Array, inertia: Array) -> dict[str, Array]:
 def work_on_modes(
     S_bar: Array, I_bar: Array, interfaces: Mapping[str, Interface], h_spin: Array | None = None
 ) -> dict[str, Array]:
-    """Return modal forces Φᵀb (n,) of each unit load b, from invariants of a link and modes at interfaces.
+    """Return modal forces Φᵀb (n,), N/√kg, of each unit load b, from invariants of a link and modes at interfaces.
 
     `h_spin` (n,) = ∫ρI_p φ dx of a line of mass, which Ī does not have.
     """

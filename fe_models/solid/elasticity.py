@@ -1,4 +1,4 @@
-"""Three-dimensional linear elasticity in UFL: the matrices of a solid link, free in space.
+"""Three-dimensional linear elasticity in UFL: the matrices of a solid link, free in space. SI units.
 
 The mass matrix of three equal displacement components is one scalar matrix, used three times: a ninth of the memory of
 the full one. The stiffness matrix is assembled straight into PETSc's symmetric block format (upper triangle, 3 × 3

@@ -1,4 +1,4 @@
-"""Inertia shape integrals of a solid, and the unit loads whose prestress stiffens it.
+"""Inertia shape integrals of a solid, and the unit loads whose prestress stiffens it. SI units.
 
 With displacements and coordinates in the same space, every integral of docs/theory.md is a product with the scalar mass
 matrix: x is its own nodal interpolation, so nothing is lumped and nothing is approximated.

@@ -131,7 +131,7 @@ def _new_folder() -> Path | None:
 
 @struct
 class RigidFace:
-    """A face that moves as a plate."""
+    """A face that moves as a plate; SI units."""
 
     name: str  # of the interface
     nodes: Integers  # (f,) its nodes among this rank's own

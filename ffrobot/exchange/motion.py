@@ -32,7 +32,7 @@ Side = Literal["motor", "joint"]
 
 @struct
 class JointMotion:
-    """One coordinate of a joint over T outputs."""
+    """One coordinate of a joint over T outputs; SI units."""
 
     name: str  # of the joint; "NAME[k]" of coordinate k where it has several
     coordinate: Array  # (T,) rad, or m along a way

@@ -1,4 +1,4 @@
-"""How the bodies of a scene move, as a results file has it: what every moving picture is drawn from.
+"""How the bodies of a scene move, as a results file has it: what every moving picture is drawn from. SI units.
 
 r = R + A (x + s Φ p) with the exaggeration s (docs/theory.md, Kinematics). Exaggerated bodies would come apart at their
 joints: each moves with the point that carries it, along a tree of joints that starts at the ground. Planar scenes are
@@ -26,7 +26,7 @@ VISIBLE_DEFORMATION, INVISIBLE = 0.05, 1e-3  # of the mechanism's size
 
 @struct
 class MovingBody:
-    """Motion of a body at T outputs, in global axes unless stated otherwise."""
+    """Motion of a body at T outputs, SI units, in global axes unless stated otherwise."""
 
     name: str
     position: Array  # (T, 3) R, origin of its frame, in m
@@ -191,11 +191,11 @@ def targets(results: Results, analysis: str) -> list[PointTarget]:
 
 @struct
 class Marker:
-    """A place that moves, with directions."""
+    """A place with directions that moves; deflections made larger by one move it by `exaggeration` (T, 3), m."""
 
     name: str  # of the joint, or of the point
     position: Array  # (T, 3) m, global axes
-    exaggeration: Array  # (T, 3) m, by which it moves when deflections are made larger by one
+    exaggeration: Array
     directions: Array  # (T, k, 3) unit vectors in global axes
 
     def exaggerated(self, s: float) -> Array:

@@ -21,7 +21,7 @@ class Watcher:
         """A step begins that may take long."""
 
     def advance(self, t: float, end: float) -> bool:
-        """An analysis has reached time t of `end`; False stops it."""
+        """An analysis has reached time t of `end`, s; False stops it."""
         return True
 
     def stopping(self, number: int) -> None:

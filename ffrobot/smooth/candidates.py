@@ -38,7 +38,7 @@ T = TypeVar("T")
 
 @struct
 class Candidate:
-    """A stream of set points (T, n) every so many s, and the robot under it.
+    """A stream of set points (T, n), rad or m, every so many s, and the robot under it.
 
     Attributes:
         name: how it was made.

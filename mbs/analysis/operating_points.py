@@ -1,4 +1,4 @@
-"""Equilibrium; and states about which a robot is linear: it, or instants of an earlier analysis."""
+"""Equilibrium; and states about which a robot is linear: it, or instants of an earlier analysis. SI units."""
 
 from __future__ import annotations
 

@@ -346,7 +346,7 @@ def interpolated(nodes: Array, values: Array, degree: int = 5, at_rest: bool = T
 
 
 def spline(nodes: Array, values: Array, degree: int = 5, at_rest: bool = False) -> list[TimeFunction]:
-    """One function of time for each column of `values`: see `interpolated`; constants through a single node."""
+    """Functions of time by columns of `values` (N, columns) at `nodes` (N,), s, `interpolated`; constants if N is 1."""
     if len(nodes) == 1:
         return [TimeFunction.constant(value) for value in values[0]]
     curve = interpolated(nodes, values, degree, at_rest)

@@ -1,4 +1,4 @@
-"""Inverse dynamics with motors only: the analysis `kind = "motors-only"`.
+"""Inverse dynamics with motors only: the analysis `kind = "motors-only"`. SI units.
 
 `output = "tip"` follows the path exactly, by stable inversion with pre- and post-actuation where zeros lie in the right
 half plane. `output = "redefined"` follows it with a point nearer the joints, and reports what that leaves at the tip:

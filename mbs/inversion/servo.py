@@ -36,16 +36,16 @@ class Stopped(Exception):  # noqa: N818 (nothing is wrong)
 
 @struct
 class Servo:
-    """The robot under its path, held before 0 and after `end`; `factor` 1 takes the path's own points as output.
+    """The robot under its path, held before 0 and after `end`, s; `factor` 1 takes the path's own points as output.
 
     A smaller factor takes where they would be with the same motor coordinates and the deflections `factor` p +
     `offset`, which is what is expected of the rest (Wang and Vidyasagar 1991; De Luca and Siciliano 1993).
+    At `near_times` (N,), s, `near` (N, n_q) are postures without deflections.
     """
 
     model: Model
     end: float
     factor: float
-    # near_times, near: along the path, (N,) s, postures without deflections (N, n_q)
     near_times: Array
     near: Array
     where: str  # scene and analysis, for messages

@@ -1,4 +1,4 @@
-"""What all types of joints have in common: two triads, and how the scene counts the coordinates between them.
+"""What all types of joints have in common: two triads, and how the scene counts the coordinates between them. SI units.
 
 Triads coincide where the coordinates are zero. Motion is along and about z, of universal joints about x of the inner
 triad and y of the outer one. `q` (…, q_count) and `v` (…, freedoms) are the core's (mbs/core/recursion/joint): of

@@ -1,4 +1,4 @@
-"""A robot whose motors stand still: natural frequencies, shapes, and static compliance at points.
+"""A robot whose motors stand still: natural frequencies, shapes, and static compliance at points. SI units.
 
 With the coordinates of motors fixed, R δs = 0, the linear equations M δs̈ + D δṡ + K δs = F are those of δs = N δz:
 

@@ -76,7 +76,7 @@ class PoseEvaluator:
         self.segments = tuple(segments)
 
     def at(self, q: Array) -> dict[str, Array]:
-        """Findings by name in the undeformed posture q (n_q,). Raises `SolveError` where there is no equilibrium.
+        """Findings by name in the undeformed posture q (n_q,), SI. Raises `SolveError` where there is no equilibrium.
 
         joints_locked and joints_compliant: `frequency` (count,) Hz, `compliance` (k, k), `stiffness` (d,) and
         `least_stiffness` N/m, its `direction` (d,), `response` (F, d) m/N. Else: `sag` (d,) m of the point, `torque`

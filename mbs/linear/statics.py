@@ -115,7 +115,7 @@ Relief = tuple[Array | float, Array | float]
 
 
 class Statics:
-    """A model at rest at time t (s), with Newton's method for its equilibria; made once for many postures."""
+    """A model at rest at time t (s), q in rad and m, with Newton's method for its equilibria, for many postures."""
 
     def __init__(self, model: Model, t: float = 0.0) -> None:
         self.model, self.t, self.system = model, t, MultibodySystem(model)

@@ -25,7 +25,7 @@ RIGID = 1e-9  # of the largest strain of a unit motion, each in units of its spr
 
 
 class Vibrations(NamedTuple):
-    """Vibrations of M q̈ + D q̇ + K q = −C_vᵀλ, C_v q̇ = 0 about rest, without rigid motion.
+    """Vibrations of M q̈ + D q̇ + K q = −C_vᵀλ, C_v q̇ = 0 about rest, without rigid motion. SI units.
 
     frequency ω (n,) rad/s ascending; damping_ratio (n,); shape (n_v, n), M-orthonormal; springs K (n_v, n_v).
     """

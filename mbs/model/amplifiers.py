@@ -25,7 +25,7 @@ CHUNK = 1024  # voltages, all on one way up or down, whose play operators are fo
 
 @struct
 class Hysteresis:
-    """Play operators of k patches; thresholds ascend from 0, spare ones have no weight."""
+    """Play operators of k patches; thresholds, V, ascend from 0, spare ones have no weight."""
 
     weights: Array  # (MOST_PLAYS, k)
     thresholds: Array  # (MOST_PLAYS, k) V
@@ -63,7 +63,7 @@ class Hysteresis:
 
 
 class Played:
-    """State of play operators that are asked step by step, from rest on."""
+    """State of play operators that are asked step by step, from rest on; SI units."""
 
     def __init__(self, of: Hysteresis) -> None:
         self._of, self._z = of, np.zeros_like(of.weights)
@@ -77,7 +77,7 @@ class Played:
 
 @struct
 class Amplifiers:
-    """Amplifiers of k patches; without one, limits are infinite and voltages arrive at once."""
+    """Amplifiers of k patches; without one, limits are infinite and voltages arrive at once. SI units."""
 
     range: Array  # (2, k) smallest and largest voltage, V
     slew: Array  # (k,) largest rate of the voltage, V/s

@@ -1,4 +1,4 @@
-"""What a scene needs of a body: invariants of the (R, e, p) equations and the sections where things attach."""
+"""What a scene needs of a body: invariants of the (R, e, p) equations and sections where things attach. SI units."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ class BodyPoint:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Body(Invariants):
-    """Constants of one body in the equations of motion in space (Shabana, Dynamics of Multibody Systems, ch. 5).
+    """Constants of one body in the equations of motion, SI units (Shabana, Dynamics of Multibody Systems, ch. 5).
 
     Arrays are over all n modes of the link; `m_ff` is the identity. `S_bar_kl` is without S_spin, which files book
     at [2, 2].

@@ -1,4 +1,4 @@
-"""A link in pieces as the one link: what modal coordinates of the link are in those of its pieces, and back.
+"""A link in pieces as the one link: what modal coordinates of the link are in those of its pieces, and back. SI units.
 
 A link that bends as its modes say bends every piece, seen from the chord of that piece. Of the shapes of a piece those
 coordinates are taken that leave the least strain energy of the difference; since a piece has the static shapes of

@@ -29,7 +29,7 @@ class CutPlace(NamedTuple):
 
 
 class ModelParts(NamedTuple):
-    """A mechanism in space as the core takes it.
+    """A mechanism in space as the core takes it; SI units.
 
     `wrenches` are the markers on which forces act, `cut` joints at which loops are cut and along which something acts.
     """
@@ -183,7 +183,7 @@ class Motion(NamedTuple):
 
 
 class Kinematics:
-    """Kinematic model of a tree in the core, without loads, for given sections and constraint rows."""
+    """Kinematic model of a tree in the core, without loads, for given sections and constraint rows. SI units."""
 
     def __init__(
         self, nodes: Sequence[Node], sections: Sequence[Section] = (), rows: Sequence[ConstraintRow] = ()

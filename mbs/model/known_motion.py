@@ -72,7 +72,7 @@ class SectionMotion(NamedTuple):
 
 @struct
 class MotionForces:
-    """Forces (N) and moments (N·m) between bodies and in joints over states (T, …), global axes.
+    """Forces (N) and moments (N·m) between bodies and in joints over states (T, …), SI units, global axes.
 
     Moments are about the origins of the sections on which they act: mbs/core/recursion/inverse/motion_forces.h.
     """

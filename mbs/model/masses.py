@@ -1,4 +1,4 @@
-"""Masses attached to sections of bodies: payloads, and what lies along a beam.
+"""Masses attached to sections of bodies: payloads, and what lies along a beam. SI units.
 
 Payloads that sections of links turn: rigid bodies, welded to them.
 

@@ -1,4 +1,4 @@
-"""A robot as analyses share it: tree and constraint rows, with their natural sizes."""
+"""A robot as analyses share it: tree and constraint rows, with their natural sizes. SI units."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LARGEST_TURN = 0.5  # rad (and sizes of the robot) that a Newton step may move: 
 
 
 class Constraints(Kinematics):
-    """Equations C(q, t) = 0 of `rows`; `length` (m) of the robot, natural sizes of rows (rows,) and joints (n_v,)."""
+    """Equations C(q, t) = 0 of `rows`, SI; `length` of the robot, natural sizes of rows (rows,) and joints (n_v,)."""
 
     def __init__(
         self, tree: KinematicTree, rows: Sequence[ConstraintRow], length: float, row_sizes: Array, joint_sizes: Array
@@ -55,7 +55,7 @@ class Constraints(Kinematics):
         return self.values(q, times)[1] * sizes / self._row_sizes[:, None]
 
     def turned_over(self, q: Array, times: Array) -> dict[str, Booleans]:
-        """Return, by loop joint and tool axis, at which of q (T, n_q) and `times` (T,) it is turned by π.
+        """Return, by loop joint and tool axis, at which of q (T, n_q) and `times` (T,), s, it is turned by π.
 
         Its "dot" rows are 0 there, too: they leave open which way the axes point that they align.
         """
@@ -123,7 +123,7 @@ class Constraints(Kinematics):
 
 @struct
 class Model:
-    """A scene in space with its bodies: everything analyses share.
+    """A scene in space with its bodies: everything analyses share. SI units.
 
     `cut` are the coordinates of joints at which loops are cut; `modal_loads` act beside the loads of the scene.
     """

@@ -1,4 +1,4 @@
-"""What motors and modal forces do in place of the forces on a path: the split of generalized forces."""
+"""What motors and modal forces do in place of the forces on a path: the split of generalized forces. SI units."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def motor_forces(model: Model, q: Array, wanted: Array) -> MotorForces:
 
 
 class FrameShare(NamedTuple):
-    """Effect of a unit torque of a motor on frames, along the tree's coordinate, on modes.
+    """Modal forces of a unit torque of a motor that turns frames, beside its torque along the joint.
 
     `direction` (n_v,), and `slope` (n_v, n_v), its derivative along v: the axis turns with the section.
     """
@@ -131,7 +131,7 @@ class FrameShare(NamedTuple):
 
 
 def frame_share(model: Model, joint: str, q: Array) -> FrameShare:
-    """Return the modal effect −Φ_rᵀ J_l(φ) z, for both sections, of a revolute joint's motor at q (n_q,).
+    """The share −Φ_rᵀ J_l(φ) z of both sections, turned by φ = Φ_r p, for a revolute joint's motor at q (n_q,).
 
     Why: core/recursion/motion/frame_motor.h.
     """

@@ -204,7 +204,7 @@ SHARED = ("name", "parent", "parent_marker", "inboard_marker", "rotor_inertia", 
 
 
 class Plane(NamedTuple):
-    """A mechanism of the core in the plane."""
+    """A mechanism of the core in the plane; SI units."""
 
     model: _core.PlanarModel  # of it
     axes: Array  # (3, 3) rows: its axes x and y and its normal, global axes

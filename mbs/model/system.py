@@ -29,7 +29,7 @@ class Integrated(NamedTuple):
 
 
 class MultibodySystem:
-    """A core model of a tree with the rows of its constraints; states (q, v) are those of the tree.
+    """A core model of a tree with the rows of its constraints; states (q, v) are those of the tree. SI units.
 
     Rows of coordinates are those of the tree in the core, `sign` times the scene's: they follow `sign` times the
     target, and their multipliers are `sign` times those of `Model.rows`.

@@ -66,7 +66,7 @@ class CompliantGear(NamedTuple):
 
 
 class KinematicTree:
-    """Spanning forest of bodies on their joints; `loops`: the loop-closing joints, in the scene's order.
+    """Spanning forest of bodies on their joints, SI units; `loops`: the loop-closing joints, in the scene's order.
 
     `tools` are the points "BODY.POINT" with axes of their own, (3, 3) columns in those of the body. `gears` are between
     its joints: none where they are taken for rigid (see `gears.with_compliance`).
@@ -188,7 +188,7 @@ class KinematicTree:
 
 
 class CutCoordinate(NamedTuple):
-    """A coordinate of a joint at which a loop is cut."""
+    """A coordinate of a joint at which a loop is cut, rad or m."""
 
     joint: JointRecord  # whose it is; of the second of its sides on the first
     number: int  # of the joint's coordinates
@@ -260,7 +260,7 @@ def loop_rows(scene: MechanismScene, tree: KinematicTree, joint: JointRecord) ->
 
 
 class CutMotion(NamedTuple):
-    """Motion of a coordinate along a cut joint."""
+    """Motion of a coordinate along a cut joint; SI units."""
 
     coordinate: Array  # (T,), full turns counted
     rate: Array  # (T,)
@@ -268,7 +268,7 @@ class CutMotion(NamedTuple):
 
 
 class AlongCut:
-    """Coordinates γ of joints at which loops are cut, measured by the core."""
+    """Coordinates γ of joints at which loops are cut, measured by the core; SI units."""
 
     def __init__(self, tree: KinematicTree, cut: Sequence[CutCoordinate]) -> None:
         self._n_v, self._all = tree.n_v, cut

@@ -1,4 +1,4 @@
-"""Fewer modes: the lowest ones of a body, and the static flexibility of the others where loads act on it.
+"""Fewer modes: the lowest ones of a body, and the static flexibility of the others where loads act on it. SI units.
 
 Mode acceleration by residual vectors (Craig, Structural Dynamics, 1981, ch. 19; Dickens, Nakagawa and Wittbrodt, A
 critique of mode acceleration and modal truncation augmentation methods, Comput. Struct. 62, 1997).

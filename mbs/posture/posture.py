@@ -1,4 +1,4 @@
-"""Postures of a robot: how it can move there, what to say of singular ones and of jumps."""
+"""Postures of a robot: how it can move there, what to say of singular ones and of jumps. SI units."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Motion that is wholly prescribed, by the core: modal coordinates by functions of time, joints by paths."""
+"""Motion that is wholly prescribed, by the core: modal coordinates by functions of time, joints by paths. SI units."""
 
 from __future__ import annotations
 

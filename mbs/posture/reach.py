@@ -23,7 +23,7 @@ BEYOND = 1e-6  # of the reach: less is round-off
 
 
 def out_of_reach(model: Model, times: Array) -> str:
-    """A message on the first path that leaves the reach of the links, at the first of `times` (T,); else ""."""
+    """A message on the first path that leaves the reach of the links, at the first of `times` (T,), s; else ""."""
     return next((f'trajectory "{name}" {how}' for name, how in _beyond(model, times)), "")
 
 
@@ -138,7 +138,7 @@ def regular_postures(model: Model, q: Array) -> Array:
 
 
 def are_regular(model: Model, q: Array, times: Array) -> Booleans:
-    """(T,) whether joints can follow all rows at `times` (T,), s, in postures q (T, n_q)."""
+    """(T,) whether joints can follow all rows at `times` (T,), s, in postures q (T, n_q), rad and m."""
     rank = min(len(model.rows), int(model.tree.joint_columns.sum()))
     return np.asarray(model.constraints.ratios(q, times, rank) > REGULAR)
 

@@ -39,7 +39,7 @@ class GridAxis:
 
 
 class Postures(NamedTuple):
-    """Undeformed postures, one for each point of the grid, the last axis fastest.
+    """Undeformed postures, rad and m, one for each point of the grid, the last axis fastest.
 
     q (P, n_q) of the robot with rigid gears; `reached` (P,) whether there is one on the branch of the start; `within`
     (P,) whether it keeps the limits of the joints.

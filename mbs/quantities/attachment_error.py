@@ -1,4 +1,4 @@
-"""What too few eigenmodes make of a run, as attachment modes tell it.
+"""What too few eigenmodes make of a run, as attachment modes tell it. SI units.
 
 What a chain of stiffened pieces misses: by how much rods with the strains of its pieces end elsewhere.
 
@@ -54,7 +54,7 @@ class Start(NamedTuple):
 
 
 class Ringing(NamedTuple):
-    """Vibrations in the first posture: ω² (m,), shapes (n_v, m) with φᵀMφ = 1, amplitudes (m,) of √(2 J)."""
+    """Vibrations in the first posture: ω² (m,), rad²/s², shapes (n_v, m) with φᵀMφ = 1, amplitudes (m,) of √(2 J)."""
 
     squares: Array
     shapes: Array

@@ -1,4 +1,4 @@
-"""All loads on a link over a motion as multiples of unit loads: forces at interfaces, and of its inertia.
+"""All loads on a link over a motion as multiples of unit loads: forces at interfaces, and of its inertia. SI units.
 
 What a joint hands to the body that it carries is what that body and its outboard subtree need for their motion, less
 what else acts there (Newton and Euler, in the core). Where motors carry the motion they do so in place of the forces

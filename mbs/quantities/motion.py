@@ -1,6 +1,6 @@
-"""Motion of bodies, sections and joints in a run, and how well it meets the constraint equations.
+"""Motion of bodies, sections and joints in a run, and how well it meets the constraint equations. SI units.
 
-All arrays are over the output times (T, …), SI units, global axes unless a name says otherwise.
+All arrays are over the output times (T, …), global axes unless a name says otherwise.
 
 Links in pieces move as the one link. Its frame is where the link's reference condition has it: at its root, as the
 section there (cantilever), or along the chord to its tip, turned from the section at the root by no more than that

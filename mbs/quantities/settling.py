@@ -54,7 +54,7 @@ class Settling:
 
 
 class Rest(NamedTuple):
-    """Final commanded posture of a run."""
+    """Final commanded posture of a run, rad and m."""
 
     model: Model  # the robot that they hold
     q: Array  # (n_q,)

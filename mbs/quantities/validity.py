@@ -1,4 +1,4 @@
-"""How far a run leaves the small deformations that modes describe, and how wrong its results may be for that.
+"""How far a run leaves the small deformations that modes describe, and how wrong its results may be for that. SI units.
 
 Deflection and section rotation are measured from the chord, the straight line between the ends of a link's axis: a
 rigid rotation of the frame counts for nothing, so that they are the same under every reference condition. The

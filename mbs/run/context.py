@@ -1,4 +1,4 @@
-"""What an analysis may use when it runs."""
+"""What an analysis may use when it runs. SI units."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ POSTURES = 2001  # outputs whose postures are looked at where the core does not 
 
 @struct
 class Control:
-    """Commands to motors and patches from sample to sample."""
+    """Commands to motors and patches from sample to sample; SI units."""
 
     commands: tuple[Command, ...]  # what a unit of each does
     first: Array  # (inputs,) before those of the first sample act

@@ -1,4 +1,4 @@
-"""Compliant gears: motor torques that produce, through them, a motion found with rigid gears.
+"""Compliant gears: motor torques that produce, through them, a motion found with rigid gears. SI units.
 
 Inverse analyses and equilibria take gears for rigid: their motion is that of the links, and their rotors turn with
 them. With the rigid rotor's angle ψ = N γ + α_a a gear transmits τ_s = τ − J N ψ̈ (Spong 1987). The twist

@@ -1,4 +1,4 @@
-"""What an inverse analysis found, at any time of it, to act again in other runs.
+"""What an inverse analysis found, at any time of it, to act again in other runs. SI units.
 
 Steps that were recorded are made again, stage by stage where another run has the same ones; prescribed motions are
 solved anew.

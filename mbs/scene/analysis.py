@@ -1,4 +1,4 @@
-"""What all analyses of a scene file have in common; each kind is a record of its own, in the file that runs it.
+"""What all analyses of a scene file have in common, SI units; each kind is a record, in the file that runs it.
 
 THE list of kinds is `ffrobot.scene.kinds`. Times in s.
 """

@@ -35,7 +35,7 @@ def tensor(inertia: Inertia) -> Array:
 
 
 def check_inertia(inertia: Inertia) -> Inertia:
-    """Return it. Raises `ValueError` unless symmetric, with no principal moment larger than the sum of the others.
+    """Return it (kg·m²). Raises `ValueError` unless symmetric, with no principal moment over the sum of the others.
 
     Moments may be zero: those of a point mass, and of a rod about its axis.
     """

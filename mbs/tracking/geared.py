@@ -42,7 +42,7 @@ class Gears:
 
 @struct
 class GearedServo(Servo):
-    """A path's robot whose torques (N, motors + k) are those of motors with rigid gears, then those of the gears.
+    """A path's robot whose torques (N, motors + k), N·m, are those of motors with rigid gears, then those of the gears.
 
     `without` (k,) are the same robots, each without the rotor of one gear.
     """
@@ -52,7 +52,7 @@ class GearedServo(Servo):
     without: tuple[Servo, ...]
 
     def forces(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array]:
-        """R (N, n), and torques (N, motors + k)."""
+        """R (N, n), N/√kg, and torques (N, motors + k)."""
         r, tau = super().forces(times, p, v, a)
         of_gears = [
             servo.motion.motion(as_list(times), p, v, a, self.postures(times)).tau[:, [column]]
@@ -84,11 +84,11 @@ class GearedServo(Servo):
         return np.stack(shares, axis=1)
 
     def quasi_static(self, times: Array, p: Array) -> Array:
-        """Torques of motors alone (N, motors)."""
+        """Torques of motors alone (N, motors), N·m or N, at `times` (N,), s, and p (N, n)."""
         return super().quasi_static(times, p)[:, : -len(self.without)]
 
     def slowed(self, factor: float) -> Servo:
-        """The same path in `factor` times the time."""
+        """Return the servo on the same path in `factor` times the time."""
         slower = tuple(servo.slowed(factor) for servo in self.without)
         return replace(super().slowed(factor), without=slower)  # type: ignore[call-arg]
 

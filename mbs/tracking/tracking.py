@@ -1,4 +1,4 @@
-"""Motors and patches carry the robot along its path together, within their limits: `kind = "tracking"`.
+"""Motors and patches carry the robot along its path together, within their limits: `kind = "tracking"`. SI units.
 
 The problem, its discretization and its solver are in `mbs.tracking.problem`. First comes the least voltage with which
 patches can do it; where that is within their limits, the motion of least effort follows. What each zero requires, and

@@ -32,7 +32,7 @@ NOT_LOOKED_AT = "meshes were not read, which needs trimesh: pip install trimesh 
 
 @struct
 class MeshMass:
-    """Comparison of the mesh of a link with its <inertial>."""
+    """Comparison of the mesh of a link with its <inertial>; SI units."""
 
     link: str
     volume: float  # m³
@@ -138,7 +138,7 @@ def bars(points: Sequence[Array], radius: float) -> Iterator[Primitive]:
 
 @struct
 class Filling:
-    """Material that fills the shapes of links without mass."""
+    """Material that fills the shapes of links without mass; SI units."""
 
     density: float  # kg/m³
     radius: float | None = None  # m, of a cylinder along a link that has no shape of its own; None for no cylinder

@@ -37,7 +37,7 @@ CELL_TYPE = {1: 1, 2: 3, 3: 5, 4: 9}
 
 @struct
 class Grid:
-    """Cells on P points that move over T steps."""
+    """Cells on P points that move over T steps; SI units."""
 
     cells: Sequence[Integers]  # blocks (c, v) of cells with v corners each, in order
     points: Array  # (T, P, 3) in m
@@ -128,7 +128,7 @@ Place = Sequence[float]  # three
 
 @struct
 class Picture:
-    """A picture to be drawn, or the frames of a movie."""
+    """A picture to be drawn, or the frames of a movie; SI units."""
 
     title: str  # above it
     grid: str = ""  # the .vtkhdf file
