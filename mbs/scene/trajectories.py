@@ -1,13 +1,12 @@
 """Trajectories of a scene, key by key: motion that is specified. SI units; angles in rad."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from itertools import pairwise
 from math import inf
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ...common.arrays import Array
@@ -170,7 +169,7 @@ class MotionKeys(Referring):
     def _shaped(self, motion: Piecewise) -> Piecewise:
         return motion if self.shaper is None else self.shaper.shape(motion)
 
-    def _through(self, places: Array, start: float, duration: ArrayLike | None) -> Piecewise:
+    def _through(self, places: Array, start: float, duration: float | Sequence[float] | Array | None) -> Piecewise:
         profile, count = self.profile or "rest-to-rest", len(places) - 1
         assert profile != "spline"
         limits = PathLimits(*(inf if value is None else value for value in (self.speed, self.acceleration, self.jerk)))
