@@ -191,15 +191,22 @@ def _point(key: str, place: Place, body: ModalBody | None, spatial: Body) -> Bod
 
 @struct
 class PointForces:
-    """Forces at the actuation points of one body over time; `unmet`: the generalized ones that they leave."""
+    """Forces at the actuation points of one body over time.
 
-    force: Array  # (T, c) N along each component, body axes
-    # (T, 6 + n) Q_a − L_a F_a on R and on the rotation, both in axes of the body, and on p: N, N·m, N/√kg; in the plane
-    # (T, 3 + n) on (R, θ, p), R in global axes
+    Attributes:
+        force: (T, c) N along each component, body axes.
+        unmet: (T, 6 + n) Q_a − L_a F_a on R and on the rotation, both in axes of the body, and on p: N, N·m, N/√kg; in
+            the plane (T, 3 + n) on (R, θ, p), R in global axes.
+        residual: (T,) N, norm of the scaled `unmet`.
+        rank: least rank of the scaled L_a.
+        condition_number: largest of the scaled L_a.
+    """
+
+    force: Array
     unmet: Array
-    residual: Array  # (T,) N, norm of the scaled `unmet`
-    rank: int  # least rank of the scaled L_a
-    condition_number: float  # largest of the scaled L_a
+    residual: Array
+    rank: int
+    condition_number: float
 
 
 def solve_points(chosen: PointSet, run: Run) -> PointForces:

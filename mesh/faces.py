@@ -33,14 +33,20 @@ _LISTED = 12
 
 @struct
 class PartBoundary:
-    """The boundary of a part; SI units."""
+    """The boundary of a part; SI units.
 
-    points: Array  # (p, 3) of the part
-    facets: Integers  # (b, 3 or 4) corners, counter-clockwise seen from outside
-    # centroid, normal: (b, 3); normals point outward
+    Attributes:
+        points: (p, 3) of the part.
+        facets: (b, 3 or 4) corners, counter-clockwise seen from outside.
+        centroid, normal: (b, 3); normals point outward.
+        area: (b,) in m², of the straight facets.
+    """
+
+    points: Array
+    facets: Integers
     centroid: Array
     normal: Array
-    area: Array  # (b,) in m², of the straight facets
+    area: Array
 
     @classmethod
     def of(cls, part: PartMesh) -> PartBoundary:

@@ -278,20 +278,31 @@ def default_tip(model: Model) -> str:
 
 @struct
 class Setup:
-    """Data for making a controller; SI units."""
+    """Data for making a controller; SI units.
+
+    Attributes:
+        model: its equations of motion.
+        patches: by body.
+        inputs, outputs: names of commands (torques N·m or N, voltages V) and readings, as `signals` names them.
+        times: (K,) of the samples, s.
+        sample_time: s.
+        delay: s, after which a command acts.
+        reference: (K, outputs) what the sensors would read on the motion of `source`.
+        feed_forward: (K, inputs) what is commanded anyhow.
+        source: of the inverse analysis.
+    """
 
     robot: ControlledRobot
-    model: Model  # its equations of motion
-    patches: Mapping[str, LinkPatches]  # by body
-    # inputs, outputs: names of commands (torques N·m or N, voltages V) and readings, as `signals` names them
+    model: Model
+    patches: Mapping[str, LinkPatches]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    times: Array  # (K,) of the samples, s
-    sample_time: float  # s
-    delay: float  # s, after which a command acts
-    reference: Array  # (K, outputs) what the sensors would read on the motion of `source`
-    feed_forward: Array  # (K, inputs) what is commanded anyhow
-    source: Run  # of the inverse analysis
+    times: Array
+    sample_time: float
+    delay: float
+    reference: Array
+    feed_forward: Array
+    source: Run
 
     def robot_coordinates(self, joints: Iterable[str]) -> Iterator[tuple[str, str]]:
         """Yield joints with the names of their coordinates, one after the other."""

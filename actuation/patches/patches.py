@@ -145,12 +145,19 @@ def _modes_of(families: frozenset[Family], body: ModalBody, spatial: Body) -> Re
 
 @struct
 class Voltages:
-    """Voltages of patches over time."""
+    """Voltages of patches over time.
 
-    required: Array  # (T, k) V, with no limit; of least size or least residual where patches and modes differ in number
-    within_limit: Array  # (T, k) V, the best within the limits of the patches
-    unmet: Array  # (T, n) N/√kg, modal forces that `within_limit` leaves
-    served: int  # number of modes, the first ones, that the patches are to serve
+    Attributes:
+        required: (T, k) V, with no limit; of least size or least residual where patches and modes differ in number.
+        within_limit: (T, k) V, the best within the limits of the patches.
+        unmet: (T, n) N/√kg, modal forces that `within_limit` leaves.
+        served: number of modes, the first ones, that the patches are to serve.
+    """
+
+    required: Array
+    within_limit: Array
+    unmet: Array
+    served: int
 
     def at(self, rows: Indices) -> Voltages:
         """Return the voltages at some outputs alone, by their indices (k,)."""

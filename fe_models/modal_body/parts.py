@@ -78,12 +78,18 @@ def _frozen(value: object) -> object:
 
 @struct
 class Interface(Frozen):
-    """Modes at one point of the axis, in the link's frame; SI units."""
+    """Modes at one point of the axis, in the link's frame; SI units.
 
-    position: Array  # (3,) in m, undeformed
-    translation: Array  # (3, n) displacement of mode l in column l, in m per unit of its modal coordinate
-    rotation: Array  # (3, n) small rotation of the cross section, in rad per unit of modal coordinate
-    # of a solid's face, "mean" or "rigid": its mean moves so, or all of it; empty where nothing says so
+    Attributes:
+        position: (3,) in m, undeformed.
+        translation: (3, n) displacement of mode l in column l, in m per unit of its modal coordinate.
+        rotation: (3, n) small rotation of the cross section, in rad per unit of modal coordinate.
+        coupling: of a solid's face, "mean" or "rigid": its mean moves so, or all of it; empty where nothing says so.
+    """
+
+    position: Array
+    translation: Array
+    rotation: Array
     coupling: str = ""
 
 
@@ -112,25 +118,36 @@ class Stations(Frozen):
 
 @struct
 class PictureMesh(Frozen):
-    """Mesh of the link for pictures, with its mode shapes; SI units."""
+    """Mesh of the link for pictures, with its mode shapes; SI units.
 
-    points: Array  # (p, 3) in m
-    cells: Integers  # (c, v) points of each cell
-    mode_shapes: Array  # (p, 3, n) displacement per unit of modal coordinate
-    # (e, 2) points of the edges of finite elements, where `cells` divide these for a smooth picture
+    Attributes:
+        points: (p, 3) in m.
+        cells: (c, v) points of each cell.
+        mode_shapes: (p, 3, n) displacement per unit of modal coordinate.
+        edges: (e, 2) points of the edges of finite elements, where `cells` divide these for a smooth picture.
+    """
+
+    points: Array
+    cells: Integers
+    mode_shapes: Array
     edges: Integers | None = None
 
 
 @struct
 class StressPoint(Frozen):
-    """Stress and strain at one point of the link, in the link's frame; rows xx, yy, zz, yz, xz, xy."""
+    """Stress and strain at one point of the link, in the link's frame; rows xx, yy, zz, yz, xz, xy.
 
-    position: Array  # (3,) in m, undeformed
-    stress: Array  # (6, n) in Pa per unit of modal coordinate
-    # (6, n) per unit of modal coordinate; shear strains are 2ε_yz, 2ε_xz, 2ε_xy, so that stress = C strain
+    Attributes:
+        position: (3,) in m, undeformed.
+        stress: (6, n) in Pa per unit of modal coordinate.
+        strain: (6, n) per unit of modal coordinate; shear strains are 2ε_yz, 2ε_xz, 2ε_xy, so that stress = C strain.
+        static: (6, l) in Pa per unit of each load in `ModalBody.stress_loads`, of the link under its reference
+            condition; None where not known.
+    """
+
+    position: Array
+    stress: Array
     strain: Array
-    # (6, l) in Pa per unit of each load in `ModalBody.stress_loads`, of the link under its reference condition; None
-    # where not known
     static: Array | None = None
 
 

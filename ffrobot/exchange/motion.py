@@ -32,13 +32,21 @@ Side = Literal["motor", "joint"]
 
 @struct
 class JointMotion:
-    """One coordinate of a joint over T outputs; SI units."""
+    """One coordinate of a joint over T outputs; SI units.
 
-    name: str  # of the joint; "NAME[k]" of coordinate k where it has several
-    coordinate: Array  # (T,) rad, or m along a way
-    rate: Array  # (T,) rad/s or m/s
-    moment: Array | None  # (T,) N·m or N, at the joint, behind a gear; None of a joint without motor
-    # `motor_coordinate`, `motor_rate` of a compliant gear, `motor_moment` of one with a rotor (T,), as in results
+    Attributes:
+        name: of the joint; "NAME[k]" of coordinate k where it has several.
+        coordinate: (T,) rad, or m along a way.
+        rate: (T,) rad/s or m/s.
+        moment: (T,) N·m or N, at the joint, behind a gear; None of a joint without motor.
+        motor: `motor_coordinate`, `motor_rate` of a compliant gear, `motor_moment` of one with a rotor (T,), as in
+            results.
+    """
+
+    name: str
+    coordinate: Array
+    rate: Array
+    moment: Array | None
     motor: Mapping[str, Array] = field(default_factory=dict)
 
     def on(self, side: Side) -> tuple[Array, Array]:

@@ -26,17 +26,28 @@ VISIBLE_DEFORMATION, INVISIBLE = 0.05, 1e-3  # of the mechanism's size
 
 @struct
 class MovingBody:
-    """Motion of a body at T outputs, SI units, in global axes unless stated otherwise."""
+    """Motion of a body at T outputs, SI units, in global axes unless stated otherwise.
+
+    Attributes:
+        position: (T, 3) R, origin of its frame, in m.
+        orientation: (T, 4) of its frame, quaternions, scalar first.
+        modal: (T, n) its modal coordinates; None of a rigid body.
+        point_names: of its k points, as in the results: `link2.tip`; in the order of x.
+        points: (k, 3) where they are in the frame, undeformed, in m.
+        deflection: (T, k, 3) their Φ p, in the frame, in m.
+        sections: (T, k, 4) quaternions of the sections there; (T, 0, 4) in planar scenes, whose files have none.
+        shift: (T, 3) by which a unit of s moves the body as a whole, so that joints stay shut, in m; global axes.
+    """
 
     name: str
-    position: Array  # (T, 3) R, origin of its frame, in m
-    orientation: Array  # (T, 4) of its frame, quaternions, scalar first
-    modal: Array | None  # (T, n) its modal coordinates; None of a rigid body
-    point_names: tuple[str, ...]  # of its k points, as in the results: `link2.tip`; in the order of x
-    points: Array  # (k, 3) where they are in the frame, undeformed, in m
-    deflection: Array  # (T, k, 3) their Φ p, in the frame, in m
-    sections: Array  # (T, k, 4) quaternions of the sections there; (T, 0, 4) in planar scenes, whose files have none
-    shift: Array  # (T, 3) by which a unit of s moves the body as a whole, so that joints stay shut, in m; global axes
+    position: Array
+    orientation: Array
+    modal: Array | None
+    point_names: tuple[str, ...]
+    points: Array
+    deflection: Array
+    sections: Array
+    shift: Array
 
     @property
     def axes(self) -> Array:

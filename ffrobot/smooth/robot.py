@@ -46,12 +46,16 @@ def accelerations(path: Piecewise) -> tuple[Array, Array]:
 
 @struct
 class Modes:
-    """Small vibrations of the robot at one posture with its motors at rest, the slowest first: m of them."""
+    """Small vibrations of the robot at one posture with its motors at rest, the slowest first: m of them.
 
-    # omega, ratio: (m,) rad/s, and damping ratios
+    Attributes:
+        omega, ratio: (m,) rad/s, and damping ratios.
+        driven: (m, n) at the point, what a unit of acceleration of each motor drives.
+    """
+
     omega: Array
     ratio: Array
-    driven: Array  # (m, n) at the point, what a unit of acceleration of each motor drives
+    driven: Array
 
     def left(self, times: Array, accelerations: Array) -> ComplexArray:
         """Return amplitudes (m, n), m, at the point at the last of `times` (T,), s.

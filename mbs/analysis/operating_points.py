@@ -104,13 +104,19 @@ class InstantAnalysis(Analysis):
 
 
 class OperatingPoints(NamedTuple):
-    """States about which a robot is linear."""
+    """States about which a robot is linear.
 
-    model: Model  # follows nothing, its gears give where the scene says so
-    time: Array  # (T,) s
-    q: Array  # (T, n_q)
-    v: Array  # (T, n_v)
-    a: Array  # (T, n_v)
+    Attributes:
+        model: without trajectories, with compliant gears where the scene has them.
+        time: (T,) s.
+        q, v, a: (T, n_q), (T, n_v), (T, n_v).
+    """
+
+    model: Model
+    time: Array
+    q: Array
+    v: Array
+    a: Array
 
 
 def find_operating_points(context: Context, analysis: InstantAnalysis) -> tuple[Run, OperatingPoints]:

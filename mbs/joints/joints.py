@@ -65,7 +65,7 @@ class PrismaticJoint(GearedJoint):
 
 
 class ScrewJoint(AxialJoint):
-    """The second side turns about `axis` by its coordinate, rad, and slides along it by `lead` per turn."""
+    """The second side turns about `axis` by its coordinate, rad, and slides along it by `lead`, m, per turn."""
 
     type: Literal["screw"]
     only_in = SPATIAL

@@ -77,16 +77,27 @@ class Played:
 
 @struct
 class Amplifiers:
-    """Amplifiers of k patches; without one, limits are infinite and voltages arrive at once. SI units."""
+    """Amplifiers of k patches; without one, limits are infinite and voltages arrive at once. SI units.
 
-    range: Array  # (2, k) smallest and largest voltage, V
-    slew: Array  # (k,) largest rate of the voltage, V/s
-    current: Array  # (k,) largest current, A
-    capacitance: Array  # (k,) F, see above
-    bandwidth: Array  # (k,) of first order, Hz
-    delay: Array  # (k,) s
-    plays: Array  # (2, MOST_PLAYS, k) weights and thresholds of the patches' hysteresis
-    compensated: Array  # (k,) 1.0 where wanted voltages go through the inverse of the hysteresis first, else 0.0
+    Attributes:
+        range: (2, k) smallest and largest voltage, V.
+        slew: (k,) largest rate of the voltage, V/s.
+        current: (k,) largest current, A.
+        capacitance: (k,) F, see the module.
+        bandwidth: (k,) of first order, Hz.
+        delay: (k,) s.
+        plays: (2, MOST_PLAYS, k) weights and thresholds of the patches' hysteresis.
+        compensated: (k,) 1.0 where wanted voltages go through the inverse of the hysteresis first, else 0.0.
+    """
+
+    range: Array
+    slew: Array
+    current: Array
+    capacitance: Array
+    bandwidth: Array
+    delay: Array
+    plays: Array
+    compensated: Array
 
     @property
     def lag(self) -> Array:

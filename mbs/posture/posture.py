@@ -24,14 +24,21 @@ BESIDE = 0.05  # rad (and sizes of the robot) before a singular posture, where e
 
 @struct
 class Mobility:
-    """Mobility of the rigid mechanism in a posture."""
+    """Mobility of the rigid mechanism in a posture.
 
-    freedom: int  # degrees of freedom that joints and loops leave
-    followed: int  # how many of these the trajectories take
-    # smallest of largest singular value of the path's rows in these freedoms, lengths in sizes of the robot
+    Attributes:
+        freedom: degrees of freedom that joints and loops leave.
+        followed: how many of these the trajectories take.
+        ratio: smallest of largest singular value of the path's rows in these freedoms, lengths in sizes of the robot.
+        left: joints that still move with all trajectories prescribed.
+        loop_rank: how many rows of the loops are independent with rigid links.
+    """
+
+    freedom: int
+    followed: int
     ratio: float
-    left: tuple[str, ...]  # joints that still move with all trajectories prescribed
-    loop_rank: int  # how many rows of the loops are independent with rigid links
+    left: tuple[str, ...]
+    loop_rank: int
 
 
 def mobility(model: Model, q: Array) -> Mobility:
@@ -103,10 +110,7 @@ def describe_branches(model: Model, times: Array, q: Array, loop_rank: int) -> s
 
 
 def describe_loops(model: Model, t: float, q: Array, v: Array) -> str:
-    """A message if loop rows are nearly dependent at q (n_q,), v (n_v,) and time t (s); else "".
-
-    "" where they do, or did not before.
-    """
+    """A message if loop or path equations become nearly dependent at q (n_q,), v (n_v,) and time t (s); else ""."""
     loops = model.without_paths()
     before = loops.constraints.posture(model.tree.integrate(q, -BESIDE / max(float(np.abs(v).max()), 1e-300) * v), 0.0)
     if not loops.rows or before is None:

@@ -27,10 +27,15 @@ from .supply import behind_gears
 
 @struct
 class LinkLoads:
-    """Loads on a link during a motion."""
+    """Loads on a link during a motion.
 
-    sizes: Mapping[str, Array]  # (T,) of unit loads by their names (`fe_models.modal_body.unit_loads`)
-    modal_force: Array  # (T, n) N/√kg, what else acts on its modes, in the coordinates of the equations: patches
+    Attributes:
+        sizes: (T,) of unit loads by their names (`fe_models.modal_body.unit_loads`).
+        modal_force: (T, n) N/√kg, what else acts on its modes, in the coordinates of the equations: patches.
+    """
+
+    sizes: Mapping[str, Array]
+    modal_force: Array
 
 
 def loads_on_links(run: Run, bodies: Iterable[str]) -> dict[str, LinkLoads]:

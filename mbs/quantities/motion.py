@@ -38,14 +38,21 @@ X = np.array([1.0, 0.0, 0.0])
 
 @struct
 class BodyMotion:
-    """Motion of a body's frame and modes, one row per output, in global axes."""
+    """Motion of a body's frame and modes, one row per output, in global axes.
 
-    position: Array  # (T, d) R, m
-    orientation: Array  # in the plane (T,) θ, rad; in 3D (T, 4) quaternions of continuous sign
-    velocity: Array  # (T, d) m/s
-    angular_velocity: Array  # in the plane (T,), in 3D (T, 3), rad/s
-    # modal, modal_velocity: (T, n), in the modes of the modal body file; of planar bodies with fewer modes in the
-    # coordinates of the equations
+    Attributes:
+        position: (T, d) R, m.
+        orientation: in the plane (T,) θ, rad; in 3D (T, 4) quaternions of continuous sign.
+        velocity: (T, d) m/s.
+        angular_velocity: in the plane (T,), in 3D (T, 3), rad/s.
+        modal, modal_velocity: (T, n), √kg·m and √kg·m/s, in the modes of the modal body file; of planar bodies with
+            fewer modes in the coordinates of the equations.
+    """
+
+    position: Array
+    orientation: Array
+    velocity: Array
+    angular_velocity: Array
     modal: Array
     modal_velocity: Array
 

@@ -26,18 +26,28 @@ CHUNK_BYTES = 32e6  # of surface stresses at a time; more leaves the cache
 
 @struct
 class PointStress:
-    """Stress at a point over time, in the body frame; columns xx, yy, zz, yz, xz, xy."""
+    """Stress at a point over time, in the body frame; columns xx, yy, zz, yz, xz, xy.
 
-    stress: Array  # (T, 6) Pa
-    von_mises: Array  # (T,) Pa
+    Attributes:
+        stress: (T, 6) Pa.
+        von_mises: (T,) Pa.
+    """
+
+    stress: Array
+    von_mises: Array
 
 
 @struct
 class SurfaceStress:
-    """Largest von Mises stress on the surface over time, and its position."""
+    """Largest von Mises stress on the surface over time, and its position.
 
-    von_mises_max: Array  # (T,) Pa
-    position_of_max: Array  # (T, 3) m, undeformed, in the link's frame
+    Attributes:
+        von_mises_max: (T,) Pa.
+        position_of_max: (T, 3) m, undeformed, in the link's frame.
+    """
+
+    von_mises_max: Array
+    position_of_max: Array
 
 
 @struct

@@ -57,16 +57,24 @@ POSTURES = 2001  # outputs whose postures are looked at where the core does not 
 
 @struct
 class Control:
-    """Commands to motors and patches from sample to sample; SI units."""
+    """Commands to motors and patches from sample to sample; SI units.
 
-    commands: tuple[Command, ...]  # what a unit of each does
-    first: Array  # (inputs,) before those of the first sample act
-    times: Array  # (K,) s, of the samples; the commands of each act `delay` (s) later
+    Attributes:
+        commands: what a unit of each does.
+        first: (inputs,) before those of the first sample act.
+        times: (K,) s, of the samples; the commands of each act `delay` (s) later.
+        controller: commands (inputs,) from sample number, time and what was read: q (n_q,), v (n_v,), a (n_v,) in one.
+        held: commands (T, inputs) that have acted up to times (T,), s, after a run.
+        instant: s, before and after which commands are read where they change.
+    """
+
+    commands: tuple[Command, ...]
+    first: Array
+    times: Array
     delay: float
-    # commands (inputs,) from sample number, time and what was read: q (n_q,), v (n_v,), a (n_v,) in one
     controller: Callable[[int, float, Array], Array]
-    held: Callable[[Array], Array]  # commands (T, inputs) that have acted up to times (T,), s, after a run
-    instant: float  # s, before and after which commands are read where they change
+    held: Callable[[Array], Array]
+    instant: float
 
 
 def drive_robot(

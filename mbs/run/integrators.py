@@ -51,7 +51,7 @@ class Rule(NamedTuple):
     last_resort: float = 100.0
 
     def cost_of_radau(self, coordinates: int, replay: float) -> float:
-        """A step of Radau in those of DOP853; `replay`: further evaluations at each time, of an earlier motion."""
+        """Cost of a Radau step in DOP853 steps; `replay`: further evaluations at each time, of an earlier motion."""
         one = 1.0 + replay
         return (self.of_radau * one + self.of_algebra * coordinates) / (self.of_dop853 * one)
 

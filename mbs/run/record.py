@@ -87,17 +87,25 @@ class GearCurve(NamedTuple):
 
 @struct
 class GearMotion:
-    """Motion of a compliant gear in an inverse analysis, one row per output."""
+    """Motion of a compliant gear in an inverse analysis, one row per output.
 
-    gear_moment: Array  # (T,) τ_s = k (θ_m − γ) + c (θ̇_m − γ̇), N·m: what the gear does to the second body
-    # angle, rate, acceleration: (T,) of the motor behind its gear, θ_m, rad
+    Attributes:
+        gear_moment: (T,) τ_s = k (θ_m − γ) + c (θ̇_m − γ̇), N·m: what the gear does to the second body.
+        angle, rate, acceleration: (T,) of the motor behind its gear, θ_m, rad.
+        moment: (T,) τ_s + J N ψ̈, N·m, of the motor, behind its gear.
+        unresolved: part of the largest moment by which it changes when only every second output is known.
+        twist: (T, 3) δ = θ_m − γ, rad, and its derivatives.
+        curve: δ(t) between outputs; None where there are too few.
+    """
+
+    gear_moment: Array
     angle: Array
     rate: Array
     acceleration: Array
-    moment: Array  # (T,) τ_s + J N ψ̈ of the motor, behind its gear
-    unresolved: float  # part of the largest moment by which it changes when only every second output is known
-    twist: Array  # (T, 3) δ = θ_m − γ and its derivatives
-    curve: GearCurve | None  # δ(t) between outputs; None where there are too few
+    moment: Array
+    unresolved: float
+    twist: Array
+    curve: GearCurve | None
 
 
 class Details:

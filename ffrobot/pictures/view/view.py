@@ -37,13 +37,20 @@ CELL_TYPE = {1: 1, 2: 3, 3: 5, 4: 9}
 
 @struct
 class Grid:
-    """Cells on P points that move over T steps; SI units."""
+    """Cells on P points that move over T steps; SI units.
 
-    cells: Sequence[Integers]  # blocks (c, v) of cells with v corners each, in order
-    points: Array  # (T, P, 3) in m
-    time: Array | None = None  # (T,) in s; None for a grid that stands still, T = 1
-    point_data: Mapping[str, Array] = field(default_factory=dict)  # (T, P) or (T, P, 3) by name
-    # (C,) by name, for all cells of all blocks
+    Attributes:
+        cells: blocks (c, v) of cells with v corners each, in order.
+        points: (T, P, 3) in m.
+        time: (T,) in s; None for a grid that stands still, T = 1.
+        point_data: (T, P) or (T, P, 3) by name.
+        cell_data: (C,) by name, for all cells of all blocks.
+    """
+
+    cells: Sequence[Integers]
+    points: Array
+    time: Array | None = None
+    point_data: Mapping[str, Array] = field(default_factory=dict)
     cell_data: Mapping[str, NDArray[np.generic]] = field(default_factory=dict)
 
 
