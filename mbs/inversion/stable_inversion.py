@@ -148,7 +148,7 @@ class _Solver:
         self.unmet, self.curve = float(unmet.max()), self.curve or collocated.curve
 
     def march(self, corners: Array) -> None:
-        """One window after the other between `corners` (k,), s, each from where the last one ended, as long as r lets.
+        """One window after the other between `corners` (k,), s, each from where the last ended, while r allows.
 
         With derivatives near the state there: iterations with others get out of phase with fast vibrations.
         """

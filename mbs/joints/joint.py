@@ -180,8 +180,8 @@ class JointRecord(Record):
     freedoms: ClassVar[int] = 0
     loop_equations: ClassVar[tuple[LoopEquation, ...] | None] = None  # None where it cannot close a loop
     along: ClassVar[tuple[Along, ...]] = ()  # its coordinates where it does, in the scene's order
-    locates: ClassVar[bool] = True
     exchanged: ClassVar[Array] = np.eye(3)  # its axes on exchanged sides, columns, in those before
+    locates: ClassVar[bool] = True
     """Whether it fixes the place of one body on the other; the initial guess goes along such joints first."""
 
     @model_validator(mode="after")
