@@ -16,22 +16,33 @@ Tags = NDArray[np.int32]
 
 @struct
 class PartMesh:
-    """A solid part, meshed, in m."""
+    """A solid part, meshed, in m.
 
-    points: Array  # (p, 3) in m, in the link's frame once `placed`
-    cells: Integers  # (c, v) points of each cell, in gmsh's order of nodes
-    cell: CellName  # their shape
-    degree: int  # 1 (corners only) or 2 (curved cells: gmsh's 10 or 27 nodes)
-    cell_tag: Tags  # (c,) which region each cell belongs to
-    regions: Mapping[str, int] = field(default_factory=dict)  # volume group → its tag, the largest group first
-    # (f, 3 or 4) corners of the tagged facets, all of them on the boundary
+    Attributes:
+        points: (p, 3) in m, in the link's frame once `placed`.
+        cells: (c, v) points of each cell, in gmsh's order of nodes.
+        cell: their shape.
+        degree: 1 (corners only) or 2 (curved cells: gmsh's 10 or 27 nodes).
+        cell_tag: (c,) which region each cell belongs to.
+        regions: volume group → its tag, the largest group first.
+        facets: (f, 3 or 4) corners of the tagged facets, all of them on the boundary.
+        facet_tag: (f,) which face each belongs to; a facet has one tag.
+        faces: name → tag in `facet_tag`; two names may share a face.
+        overlaps: volume group → further tags, of its cells that belong to other groups too.
+        remarks: what the part's file holds and the link does not, a sentence each.
+    """
+
+    points: Array
+    cells: Integers
+    cell: CellName
+    degree: int
+    cell_tag: Tags
+    regions: Mapping[str, int] = field(default_factory=dict)
     facets: Integers = field(default_factory=lambda: np.empty((0, 3), dtype=np.int64))
-    # (f,) which face each belongs to; a facet has one tag
     facet_tag: Tags = field(default_factory=lambda: np.empty(0, dtype=np.int32))
-    faces: Mapping[str, int] = field(default_factory=dict)  # name → tag in `facet_tag`; two names may share a face
-    # volume group → further tags, of its cells that belong to other groups too
+    faces: Mapping[str, int] = field(default_factory=dict)
     overlaps: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
-    remarks: tuple[str, ...] = ()  # what the part's file holds and the link does not, a sentence each
+    remarks: tuple[str, ...] = ()
 
     @property
     def shape(self) -> Cell:

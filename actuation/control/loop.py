@@ -174,26 +174,41 @@ def measure(run: LoopMotion, setup: Setup, loop: Loop, lowest: float, is_stable:
 
 @struct
 class LoopRecord(Details):
-    """Samples, metrics, margins and advice of a closed loop."""
+    """Samples, metrics, margins and advice of a closed loop.
 
-    # inputs, outputs: names of commands and readings
+    Attributes:
+        inputs, outputs: names of commands and readings.
+        time: (K,) s, of the samples taken.
+        readings: (K, outputs).
+        reference: (K, outputs) readings on the reference motion.
+        commands: (K, inputs) within limits.
+        wanted: (K, inputs) before limits.
+        tip_error_peak_time: s, of the largest at all times.
+        margins: by the linear model; None where controllers, or the robot, are not linear.
+        poles: of the linear loop at the start, from sample to sample.
+        warnings: one line each.
+        advice: what to try, a text each, where the loop is not stable.
+        feedback: from readings to commands, off the reference, by time (s): at the start, or along a schedule.
+        tip_error: (T,) m at the outputs of the run.
+        estimate: of an observer.
+    """
+
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    time: Array  # (K,) s, of the samples taken
-    readings: Array  # (K, outputs)
-    reference: Array  # (K, outputs) readings on the reference motion
-    commands: Array  # (K, inputs) within limits
-    wanted: Array  # (K, inputs) before limits
-    tip_error_peak_time: float  # s, of the largest at all times
+    time: Array
+    readings: Array
+    reference: Array
+    commands: Array
+    wanted: Array
+    tip_error_peak_time: float
     metrics: Metrics
-    margins: Margins | None  # by the linear model; None where controllers, or the robot, are not linear
-    poles: ComplexArray | None  # of the linear loop at the start, from sample to sample
-    warnings: tuple[str, ...]  # one line each
-    advice: tuple[str, ...] = ()  # what to try, a text each, where the loop is not stable
-    # from readings to commands, off the reference, by time (s): at the start, or along a schedule
+    margins: Margins | None
+    poles: ComplexArray | None
+    warnings: tuple[str, ...]
+    advice: tuple[str, ...] = ()
     feedback: Mapping[float, Feedback] = field(default_factory=dict)
-    tip_error: Array = field(default_factory=lambda: np.zeros(0))  # (T,) m at the outputs of the run
-    estimate: Estimates | None = None  # of an observer
+    tip_error: Array = field(default_factory=lambda: np.zeros(0))
+    estimate: Estimates | None = None
 
 
 def between(times: Array, known: Array, values: Array) -> Array:

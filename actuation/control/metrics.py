@@ -71,17 +71,29 @@ class Metrics:
 
 @struct
 class LoopMotion:
-    """Motion of a closed loop, at outputs and between; SI units."""
+    """Motion of a closed loop, at outputs and between; SI units.
 
-    time: Array  # (T,) s
-    error: Array  # (T, d) m, of the tip from its place
-    place_at: Callable[[Array], Array]  # (T, d) m at times (T,), where the tip should be
-    rates: Array  # (T, motors) rad/s, m/s
-    held: Array  # (T, inputs) commands
-    completed: bool  # whether it came to its end
-    is_disturbed: bool  # by loads that the reference does not know
-    quiet: float  # s, from which on the reference rests and loads stay
-    length: float  # m, the size of the robot
+    Attributes:
+        time: (T,) s.
+        error: (T, d) m, of the tip from its place.
+        place_at: (T, d) m at times (T,), where the tip should be.
+        rates: (T, motors) rad/s, m/s.
+        held: (T, inputs) commands.
+        completed: whether it came to its end.
+        is_disturbed: by loads that the reference does not know.
+        quiet: s, from which on the reference rests and loads stay.
+        length: m, the size of the robot.
+    """
+
+    time: Array
+    error: Array
+    place_at: Callable[[Array], Array]
+    rates: Array
+    held: Array
+    completed: bool
+    is_disturbed: bool
+    quiet: float
+    length: float
 
 
 def ringing(time: Array, place: Array, lowest: float) -> tuple[float, float]:

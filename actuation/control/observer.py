@@ -241,17 +241,27 @@ class Schedule:
 
 @struct
 class Estimates:
-    """Estimates at K samples, and tip error against the true motion."""
+    """Estimates at K samples, and tip error against the true motion.
+
+    Attributes:
+        values: (K, names).
+        position: (K, d) m, estimated of the tip.
+        error: (K,) m, distance from the true position.
+        sigma: (K, d) m, standard deviations by the covariance of the filter.
+        nees: mean of eᵀ Σ⁻¹ e over the number of axes, 1 if the covariance is right.
+        inside: part of the errors within ±2σ, 0.95 if the covariance is right.
+        poles: of the estimate's error, from sample to sample, at the start.
+    """
 
     names: tuple[str, ...]
-    values: Array  # (K, names)
+    values: Array
     tip: str
-    position: Array  # (K, d) m, estimated of the tip
-    error: Array  # (K,) m, distance from the true position
-    sigma: Array  # (K, d) m, standard deviations by the covariance of the filter
-    nees: float  # mean of eᵀ Σ⁻¹ e over the number of axes, 1 if the covariance is right
-    inside: float  # part of the errors within ±2σ, 0.95 if the covariance is right
-    poles: ComplexArray  # of the estimate's error, from sample to sample, at the start
+    position: Array
+    error: Array
+    sigma: Array
+    nees: float
+    inside: float
+    poles: ComplexArray
 
 
 class Observed:

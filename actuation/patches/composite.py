@@ -250,14 +250,23 @@ STEP = 0.1  # of the extent, from one station to the next; less is a taper
 
 
 class Effects(NamedTuple):
-    """Effects of k patches on the n modes of a modal body."""
+    """Effects of k patches on the n modes of a modal body.
 
-    extent: Array  # (k,) t_b, of the link along their normal under each patch, its mean, m: see `LinkSections.extent`
-    per_volt: Array  # (k,) c, the load along the strain that each actuates, N·m/V
-    lever: Array  # (k,) strain of the surface by unit curvature and distance; by twist, β/2, of its diagonals
-    turn: Array  # (k, n) by how much the sections at the patch's ends turn against each other in its own sense, rad
-    Phi_V: Array  # (k, n) modal forces per volt, less what the layers' own stiffness takes
-    yielding: Array  # (k,) what strains that modes lack add to the capacitance, F
+    Attributes:
+        extent: (k,) t_b, of the link along their normal under each patch, its mean, m: see `LinkSections.extent`.
+        per_volt: (k,) c, the load along the strain that each actuates, N·m/V.
+        lever: (k,) strain of the surface by unit curvature and distance; by twist, β/2, of its diagonals.
+        turn: (k, n) by how much the sections at the patch's ends turn against each other in its own sense, rad.
+        Phi_V: (k, n) modal forces per volt, less what the layers' own stiffness takes.
+        yielding: (k,) what strains that modes lack add to the capacitance, F.
+    """
+
+    extent: Array
+    per_volt: Array
+    lever: Array
+    turn: Array
+    Phi_V: Array
+    yielding: Array
 
 
 def effects(key: str, placed: Sequence[PlacedLayout], body: ModalBody) -> list[Effects]:
@@ -385,11 +394,17 @@ PASSES = 6  # until modes and the stiffness of shunts at their frequencies agree
 
 @struct
 class StructureEffect:
-    """Changes of a link by patches, bare → with patches."""
+    """Changes of a link by patches, bare → with patches.
 
-    mass: Array  # (2,) kg
-    inertia: Array  # (2,) about the body's z axis, kg·m²
-    frequency: Array  # (2, n) Hz
+    Attributes:
+        mass: (2,) kg.
+        inertia: (2,) about the body's z axis, kg·m².
+        frequency: (2, n) Hz.
+    """
+
+    mass: Array
+    inertia: Array
+    frequency: Array
 
 
 def patched_body(spatial: Body, body: ModalBody, placed: Sequence[PlacedLayout]) -> Body:

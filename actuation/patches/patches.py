@@ -29,14 +29,22 @@ ENERGY_WEIGHT = 1e-4  # of the strain energy rᵀ K⁻¹ r beside weights of poi
 
 @struct
 class Reach:
-    """Modal forces of k patches on n modes, and the weights of the modes."""
+    """Modal forces of k patches on n modes, and the weights of the modes.
+
+    Attributes:
+        Phi_V: (n, k) modal forces per volt, N/(√kg·V).
+        amplifiers: of the k patches.
+        W_sqrt: (rows, n) |W_sqrt r|² of the modal forces r left unmet is made small.
+        frequency: (n,) of the modes, Hz.
+        served: number of modes, the first ones, that the patches are to serve: attachment modes are not among them.
+    """
 
     _: KW_ONLY
-    Phi_V: Array  # (n, k) modal forces per volt, N/(√kg·V)
-    amplifiers: Amplifiers  # of the k patches
-    W_sqrt: Array  # (rows, n) |W_sqrt r|² of the modal forces r left unmet is made small
-    frequency: Array  # (n,) of the modes, Hz
-    served: int  # number of modes, the first ones, that the patches are to serve: attachment modes are not among them
+    Phi_V: Array
+    amplifiers: Amplifiers
+    W_sqrt: Array
+    frequency: Array
+    served: int
 
     @property
     def limit(self) -> Array:
@@ -104,14 +112,20 @@ OUT_OF_REACH = 1e-9  # of the largest modal force per volt: less is round-off
 
 @struct
 class ReachedModes:
-    """Modes of a link that moves in some families of modes only, in coordinates p' that decouple them."""
+    """Modes of a link that moves in some families of modes only, in coordinates p' that decouple them.
 
-    rows: Indices  # (m,) numbers (from 0) of the modes of the modal body in these families
-    # (m, m) p of these rows from p', in which m_ff is the identity and K_ff diagonal; (m, fewer) where equations keep
-    # fewer, see `link_patches.on_kept_modes`
+    Attributes:
+        rows: (m,) numbers (from 0) of the modes of the modal body in these families.
+        T: (m, m) p of these rows from p', in which m_ff is the identity and K_ff diagonal; (m, fewer) where equations
+            keep fewer, see `link_patches.on_kept_modes`.
+        stiffness: (m,) of the p', rad²/s².
+        served: number of the p', the first ones, that are no attachment modes.
+    """
+
+    rows: Indices
     T: Array
-    stiffness: Array  # (m,) of the p', rad²/s²
-    served: int  # number of the p', the first ones, that are no attachment modes
+    stiffness: Array
+    served: int
 
     def forces(self, F_p: Array) -> Array:
         """Return modal forces (T, m) on p', N/√kg, from those on the modes of the modal body (T, n)."""
@@ -209,16 +223,27 @@ def solve_voltages(patches: Reach, F_p: Array) -> Voltages:
 
 @struct
 class PatchArray(Reach):
-    """The patches of one layout."""
+    """The patches of one layout.
 
-    layout: PztLayout  # the keys of the scene
-    edges: Array  # (k, 2) where each patch begins and ends along the link, m
-    height: Array  # (k,) t_b, of the link along their normal under each patch, its mean, m
-    moment_per_volt: Array  # (k,) c in N·m/V
-    turn: Array  # (n, k) φ'(x2) − φ'(x1) of the n modes of the body, rad per unit of modal coordinate; of twist φ_x
-    link: ModalBody  # the modal body of the link that they are on
-    lever: Array  # (k,) strain of the surface by unit turn per length and distance: 1 of bending
-    read_capacitance: Array  # (k,) F, as sensors; see `PztLayout.read_capacitance`
+    Attributes:
+        layout: the keys of the scene.
+        edges: (k, 2) where each patch begins and ends along the link, m.
+        height: (k,) t_b, of the link along their normal under each patch, its mean, m.
+        moment_per_volt: (k,) c in N·m/V.
+        turn: (n, k) φ'(x2) − φ'(x1) of the n modes of the body, rad per unit of modal coordinate; of twist φ_x.
+        link: the modal body of the link that they are on.
+        lever: (k,) strain of the surface by unit turn per length and distance: 1 of bending.
+        read_capacitance: (k,) F, as sensors; see `PztLayout.read_capacitance`.
+    """
+
+    layout: PztLayout
+    edges: Array
+    height: Array
+    moment_per_volt: Array
+    turn: Array
+    link: ModalBody
+    lever: Array
+    read_capacitance: Array
 
     @cached_property
     def _stiffness(self) -> tuple[Array, Array]:

@@ -95,24 +95,34 @@ class Interface(Frozen):
 
 @struct
 class Stations(Frozen):
-    """Points along the axis, ascending in x, at which the modes are known; SI units."""
+    """Points along the axis, ascending in x, at which the modes are known; SI units.
 
-    position: Array  # (k, 3) in m
-    translation: Array  # (k, 3, n), as in `Interface`
-    rotation: Array  # (k, 3, n), as in `Interface`
-    # (k,) extent of the cross section along y in m; height[i] holds from station i up to station i + 1 (of a taper, the
-    # height in the middle between the two)
+    Attributes:
+        position: (k, 3) in m.
+        translation: (k, 3, n), as in `Interface`.
+        rotation: (k, 3, n), as in `Interface`.
+        height: (k,) extent of the cross section along y in m; height[i] holds from station i up to station i + 1 (of a
+            taper, the height in the middle between the two).
+        element: (e, 4) the stations on which each element's shapes are cubics, ascending; None where not known.
+        outline: (k, q, 2) corners (y, z) of a beam's section in m, for pictures; holds as `height` does; None where not
+            known.
+        rigidity: (k, 2) EA in N and EI in N·m² of in-plane bending; holds as `height` does; None where not known.
+        width: (k,) extent along z in m, likewise.
+        out_of_plane_rigidity: (k,) EI in N·m² of bending along z, likewise.
+        torsional_rigidity: (k,) GJ in N·m², likewise.
+        middle: (k, 2) middle of the extents along y and z, from the axis, in m, likewise; None where it is on the axis.
+    """
+
+    position: Array
+    translation: Array
+    rotation: Array
     height: Array
-    # (e, 4) the stations on which each element's shapes are cubics, ascending; None where not known
     element: Integers | None = None
-    # (k, q, 2) corners (y, z) of a beam's section in m, for pictures; holds as `height` does; None where not known
     outline: Array | None = None
-    # (k, 2) EA in N and EI in N·m² of in-plane bending; holds as `height` does; None where not known
     rigidity: Array | None = None
-    width: Array | None = None  # (k,) extent along z in m, likewise
-    out_of_plane_rigidity: Array | None = None  # (k,) EI in N·m² of bending along z, likewise
-    torsional_rigidity: Array | None = None  # (k,) GJ in N·m², likewise
-    # (k, 2) middle of the extents along y and z, from the axis, in m, likewise; None where it is on the axis
+    width: Array | None = None
+    out_of_plane_rigidity: Array | None = None
+    torsional_rigidity: Array | None = None
     middle: Array | None = None
 
 
@@ -169,15 +179,21 @@ class MeasuredValues(Frozen):
 
 @struct
 class OutlinedPatches(Frozen):
-    """Piezoelectric patches whose outlines, m, are edges of the mesh, on the faces at largest (top) and smallest y."""
+    """Piezoelectric patches whose outlines, m, are edges of the mesh, on the faces at largest (top) and smallest y.
 
-    edges: Array  # (k, 2) begin and end of each patch, m from the root
-    width: float  # along z, in m
-    # (k, n) ∫ t·ε(Φ)t ds over each patch, with t the link's direction: modal forces per unit of membrane force (N/m,
-    # positive in tension), in m² per unit of modal coordinate; None where no patches are on that face
+    Attributes:
+        edges: (k, 2) begin and end of each patch, m from the root.
+        width: along z, in m.
+        top: (k, n) ∫ t·ε(Φ)t ds over each patch, with t the link's direction: modal forces per unit of membrane force
+            (N/m, positive in tension), in m² per unit of modal coordinate; None where no patches are on that face.
+        bottom: (k, n) likewise.
+        top_across, bottom_across: (k, n) the same of the strain across, ∫ ε_zz(Φ) ds; None in earlier files, too.
+    """
+
+    edges: Array
+    width: float
     top: Array | None = None
-    bottom: Array | None = None  # (k, n) likewise
-    # (k, n) the same of the strain across, ∫ ε_zz(Φ) ds; None in files of earlier versions, too
+    bottom: Array | None = None
     top_across: Array | None = None
     bottom_across: Array | None = None
 

@@ -41,6 +41,11 @@ class Servo:
     A smaller factor takes where they would be with the same motor coordinates and the deflections `factor` p +
     `offset`, which is what is expected of the rest (Wang and Vidyasagar 1991; De Luca and Siciliano 1993).
     At `near_times` (N,), s, `near` (N, n_q) are postures without deflections.
+
+    Attributes:
+        where: scene and analysis, for messages.
+        goes_on: is asked again and again whether to go on.
+        offset: what is expected of deflections that the output leaves out: one for each mode of all bodies, or none.
     """
 
     model: Model
@@ -48,9 +53,8 @@ class Servo:
     factor: float
     near_times: Array
     near: Array
-    where: str  # scene and analysis, for messages
-    goes_on: Callable[[], bool]  # is asked again and again whether to go on
-    # what is expected of deflections that the output leaves out: one for each mode of all bodies, or none
+    where: str
+    goes_on: Callable[[], bool]
     offset: tuple[TimeFunction, ...] = ()
 
     @cached_property

@@ -27,13 +27,19 @@ IN_PLANE = ("t_x", "t_y", "r_z", "omega_zz")
 
 @struct
 class Stiffening:
-    """Integrals of G in the modal coordinates of a `Body`; K is positive where it stiffens under that load."""
+    """Integrals of G in the modal coordinates of a `Body`; K is positive where it stiffens under that load.
 
-    K_s: Array  # (3, n, n) ∫ρ G_l dV
-    K_x: Array  # (3, 3, n, n) ∫ρ x_k G_l dV at [k, l]
-    K_points: Mapping[str, Array]  # (6, n, n) of forces along and moments about x, y, z at each interface
-    # (3, 3, n, n) of the extent of payloads, which turn with their points: what S̄_kl has of it where K_x has it to
-    # second order, too
+    Attributes:
+        K_s: (3, n, n) ∫ρ G_l dV.
+        K_x: (3, 3, n, n) ∫ρ x_k G_l dV at [k, l].
+        K_points: (6, n, n) of forces along and moments about x, y, z at each interface.
+        S_turned: (3, 3, n, n) of the extent of payloads, which turn with their points: what S̄_kl has of it where K_x
+            has it to second order, too.
+    """
+
+    K_s: Array
+    K_x: Array
+    K_points: Mapping[str, Array]
     S_turned: Array
 
     def at(self, point: str) -> Array:

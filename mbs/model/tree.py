@@ -260,11 +260,17 @@ def loop_rows(scene: MechanismScene, tree: KinematicTree, joint: JointRecord) ->
 
 
 class CutMotion(NamedTuple):
-    """Motion of a coordinate along a cut joint; SI units."""
+    """Motion of a coordinate along a cut joint; SI units.
 
-    coordinate: Array  # (T,), full turns counted
-    rate: Array  # (T,)
-    is_counted: bool  # whether the times are close enough together to count its turns
+    Attributes:
+        coordinate: (T,), full turns counted.
+        rate: (T,).
+        is_counted: whether the times are close enough together to count its turns.
+    """
+
+    coordinate: Array
+    rate: Array
+    is_counted: bool
 
 
 class AlongCut:

@@ -107,14 +107,19 @@ def _in_motor_coordinates(compliant: Model, state: States, gears: Mapping[str, G
 
 
 class MotorCoordinates(NamedTuple):
-    """Motion in the coordinates of a robot with compliant gears."""
+    """Motion in the coordinates of a robot with compliant gears.
 
-    # q, v, a: (T, n_q), (T, n_v), (T, n_v)
+    Attributes:
+        q, v, a: (T, n_q), (T, n_v), (T, n_v).
+        gears: by joint, those that are rigid in the motion; none where they are compliant in it, too.
+        moments: (T, k) by joint, of all motors where gears are rigid in the motion.
+    """
+
     q: Array
     v: Array
     a: Array
-    gears: Mapping[str, GearMotion]  # by joint, those that are rigid in the motion; none where they give in it, too
-    moments: Mapping[str, Array]  # (T, k) by joint, of all motors where gears are rigid in the motion
+    gears: Mapping[str, GearMotion]
+    moments: Mapping[str, Array]
 
 
 def with_motor_coordinates(run: Run, model: Model) -> MotorCoordinates:

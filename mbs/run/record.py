@@ -120,13 +120,21 @@ class Details:
 
 
 class Prescription(NamedTuple):
-    """A motion of which the modes are functions of time."""
+    """A motion of which the modes are functions of time.
 
-    motion: Callable[[], _core.SpatialPrescribedMotion]  # makes its equations, each time new ones
-    shape: Sequence[Sequence[TimeFunction]]  # p(t) of each body
-    near: Array  # (n_q,) a posture near the first
-    voltages: Mapping[str, PPoly] = MappingProxyType({})  # V(t) (k,) by body, where the analysis itself finds them
-    breaks: Sequence[float] = ()  # s, between pieces of p(t), where p̈ jumps
+    Attributes:
+        motion: makes its equations, each time new ones.
+        shape: p(t) of each body.
+        near: (n_q,) a posture near the first.
+        voltages: V(t) (k,) by body, where the analysis itself finds them.
+        breaks: s, between pieces of p(t), where p̈ jumps.
+    """
+
+    motion: Callable[[], _core.SpatialPrescribedMotion]
+    shape: Sequence[Sequence[TimeFunction]]
+    near: Array
+    voltages: Mapping[str, PPoly] = MappingProxyType({})
+    breaks: Sequence[float] = ()
 
 
 @struct
