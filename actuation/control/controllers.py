@@ -115,11 +115,12 @@ def modal_velocity(record: ModalVelocity, setup: Setup) -> LinearFeedback:
     for name in record.bodies:
         link = setup.robot.patches[name]
         m = min(record.modes, len(link.omega))
-        damping = link.gain[:, :m] * (2 * record.damping_ratio * link.omega[:m])
         if record.sensor == "pzt":
             columns, modes = setup.columns(*link.inputs), estimate(link.volts, m)
+            m = len(modes)  # no more than the patches
         else:
             columns, modes = setup.modal_columns(name, link.own.shape[1]), link.own[:m]
+        damping = link.gain[:, :m] * (2 * record.damping_ratio * link.omega[:m])
         G[np.ix_(setup.patch_places(name), columns)] = damping @ modes
         bandwidth = max(bandwidth, float(link.omega[m - 1]))
     P, D = (None, G) if record.sensor == "pzt" else (G, None)

@@ -283,7 +283,7 @@ class ModalVelocity(ControllerRecord):
     bodies: Annotated[tuple[str, ...], NotEmpty]
     """Links with the driven patches."""
     modes: ModeCount = 1
-    """Number of the lowest modes per link."""
+    """Number of the lowest modes per link; with sensor = "pzt" at most that of its patches."""
     damping_ratio: Positive
     """Damping ratio ζ that is added to each of these modes."""
     sensor: Literal["pzt", "ideal"] = "pzt"

@@ -47,6 +47,16 @@ def test_patches_add_the_damping_that_is_asked_for(sensor):
     assert decay(solution, "loop") == pytest.approx(0.05, rel=0.05)
 
 
+def test_patches_damp_as_many_modes_as_they_read():
+    damper = {"kind": "modal-velocity", "bodies": ["link"], "damping_ratio": 0.05}
+    loops = [loop(f"of_{modes}", controller=[damper | {"modes": modes}]) for modes in (2, 3)]
+    patches = {"count": 2, "allocation": "least-squares"}
+    solution = solve_scene(held_link(paper_link(count=3), *loops, end=0.02, pzt=patches))
+    few, more = (solution.outcomes[f"of_{modes}"].details.commands for modes in (2, 3))
+    assert np.abs(few).max() > 0.0
+    np.testing.assert_array_equal(few, more)
+
+
 @pytest.mark.parametrize(
     ("space", "inverse"),
     [("planar", {"kind": "pcid"}), ("planar", {"kind": "fcid", "shape": "zero"}),
