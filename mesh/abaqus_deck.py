@@ -188,8 +188,8 @@ _OF_THE_LINK = (
 class Scope:
     """Content of a part, an instance or the assembly: nodes and elements by number, and sets.
 
-    `nodes` are coordinates, `solids` (type, nodes), `surfaces` corners, `others` the type of all that are no solids,
-    `masses` the node of each of type MASS.
+    `nodes` are coordinates in the unit of the deck, `solids` (type, nodes), `surfaces` corners, `others` the type of
+    all that are no solids, `masses` the node of each of type MASS.
     """
 
     frame: Frame = GLOBAL

@@ -532,9 +532,10 @@ def riccati(A: Array, B: Array, Q: Array, R: Array, within: float = 1.0) -> Arra
 
 
 def by_doubling(A: Array, B: Array, X: Array) -> Array | None:
-    """Return X of `riccati` with R = 1 by doubling, from Q on (B. D. O. Anderson, Int. J. Control 28, 1978, 295–306).
+    """Return X (n, n) of `riccati` with R = 1, A (n, n), B (n, m), by doubling from Q, given as `X`.
 
-    Step k is 2ᵏ of the Riccati recursion. None where it does not converge, or R is below round-off of Bᵀ X B.
+    Step k is 2ᵏ of the Riccati recursion (B. D. O. Anderson, Int. J. Control 28, 1978, 295–306). None where it does not
+    converge, or R is below round-off of Bᵀ X B.
     """
     unit, G = np.eye(len(A)), B @ B.T
     with np.errstate(all="ignore"), suppress(np.linalg.LinAlgError):

@@ -222,7 +222,8 @@ def verdict_of(
     decay, or a command goes from one limit to the other; "grows": vibration, from quarter to quarter of a run without
     disturbance (of its path and of the rest after it), or of the time in which nothing changes, or what is `asked`
     then, by samples (K,) in s and the largest of their commands (K,), of the largest of all; "unstable (linear)"; "not
-    settled": in that time the tip does not come to rest, though sensors are exact; else "stable".
+    settled": in that time the tip does not come to rest, though sensors are exact; else "stable". `lowest` frequency
+    of the loop, Hz; `is_seen`: motion exceeds errors of sensors.
     """
     if not run.completed:
         return "diverges"

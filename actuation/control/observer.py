@@ -250,7 +250,7 @@ class Estimates:
         sigma: (K, d) m, standard deviations by the covariance of the filter.
         nees: mean of eᵀ Σ⁻¹ e over the number of axes, 1 if the covariance is right.
         inside: part of the errors within ±2σ, 0.95 if the covariance is right.
-        poles: of the estimate's error, from sample to sample, at the start.
+        poles: (n,) of the estimate's error, from sample to sample, at the start.
     """
 
     names: tuple[str, ...]

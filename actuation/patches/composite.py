@@ -188,7 +188,7 @@ def gauss_points(body: ModalBody, intervals: Array) -> Iterator[GaussPoint]:
 
 
 def place_of(layout: PztLayout, sections: LinkSections, station: int) -> tuple[float, float]:
-    """Return the extent along the patches' normal (m), as `LinkSections.extent` of their face, and β at a station."""
+    """Return the extent along the patches' normal (m), of their face, and the ratio β of `shear_lever` at a station."""
     lever = sections.shear_lever(station, layout.normal, layout.width) if layout.lamina.shears else 0.0
     return float(sections.extent(layout.normal, side(layout))[station]), lever
 

@@ -287,7 +287,7 @@ def find_front(
     runs: int,
     tolerance: float,
 ) -> Front:
-    """Compute a Pareto front: see `ffrobot.trade_off`."""
+    """Compute `points` of the Pareto front of two responses; arguments as of `ffrobot.trade_off`."""
     path, problem = runner.path, read_problem(minimise, None, subject_to)
     space, other = read_space(path, vary), parse_response(against, "--against")
     if other.text == problem.objective.text:

@@ -199,7 +199,7 @@ def coarse_surface(results: Results, body: MovingBody, size: float, limit: int, 
 
 
 def line_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape:
-    """Return the line through the stations of a flexible body; arguments as of `surface_shape`."""
+    """Return the line through the stations of a flexible body; adds to `notes` why there is none."""
     link = _modal_body(results, body, notes)
     if link is None or body.modal is None:
         return point_shape(body)

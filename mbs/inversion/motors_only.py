@@ -90,7 +90,7 @@ def check_rest(servo: Servo, analysis: TimedAnalysis, ends: Sequence[float]) -> 
 
 
 def decay_times(linear: Linearisation, *, needs_future: bool) -> tuple[float, float]:
-    """Times (s) in which the zero dynamics dies out before and after the path."""
+    """Times (s) in which the zero dynamics dies out before the path and, if it `needs_future`, after it; else 0."""
     first, last, light, end = linear.zeros[0].real, linear.zeros[-1].real, linear.is_light[0], float(linear.times[-1])
     is_ahead = linear.is_future[0] & (first > 0)
     grow, growing_vibrations, decay = first[is_ahead & ~light], first[is_ahead & light], -last[last < 0]

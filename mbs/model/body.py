@@ -27,7 +27,7 @@ IN_PLANE = ("t_x", "t_y", "r_z", "omega_zz")
 
 @struct
 class Stiffening:
-    """Integrals of G in the modal coordinates of a `Body`; K is positive where it stiffens under that load.
+    """Integrals of G (n, n), by which points move by −½ pᵀ G_l p along l; K is positive where it stiffens under a load.
 
     Attributes:
         K_s: (3, n, n) ∫ρ G_l dV.

@@ -142,7 +142,10 @@ def planar_marker(marker: _core.SpatialMarker, axes: Array) -> _core.PlanarMarke
 
 
 def planar_data(data: _core.SpatialData, axes: Array) -> _core.PlanarData:
-    """Return the constants of a body in 2D. Raises `AcrossError` if it bends out of the plane or twists."""
+    """Return constants of a body in the plane of the first two `axes` (3, 3), rows.
+
+    Raises `AcrossError` if it bends out of the plane or twists.
+    """
     planar, normal = _core.PlanarData(), axes[2]
     along = float(normal @ data.spin_axis)
     planar.mass, planar.first_moment = data.mass, np.ascontiguousarray(axes[:2] @ data.first_moment)

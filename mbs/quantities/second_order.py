@@ -143,7 +143,8 @@ def missing_to_first_order(
 ) -> Missing:
     """Return the errors of a link without geometric stiffening; infinite if loads at rest buckle it.
 
-    p (T, n), √kg·m, are modal coordinates, `stations` (k, 3, n) translations of stations at `places` (k, 3), m.
+    p (T, n), √kg·m, are modal coordinates, `stations` (k, 3, n) translations of stations at `places` (k, 3), m, of a
+    link with that `length`, m.
     """
     if not len(p) or not loads.f.size:
         return Missing(0.0, 0.0)

@@ -21,7 +21,7 @@ Point = TypeVar("Point", str, str | None)
 
 
 class PatchedLink(Protocol):
-    """All k patches of one link, by the bodies that may carry them, of n modes: the link itself, or its pieces."""
+    """What voltages of the k patches of one link do to the bodies that carry them: the link, or its pieces."""
 
     @property
     def per_volt(self) -> Mapping[str, Array]:

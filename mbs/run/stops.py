@@ -44,7 +44,7 @@ ENDS = _Ends()
 def stops(
     times: Array, paths: Iterable[Trajectory], loads: Iterable[TimeFunction], *, is_driven: bool, is_replay: bool
 ) -> Array:
-    """Return times (n,), s, at which integration steps must end.
+    """Return times (n,), s, at which integration steps must end in a run with outputs at `times` (T,), s.
 
     Steps look at paths and loads at their stages alone, and might pass a pulse. So they end where conditions of paths
     and loads change, t < 0.1 at 0.1 s, and along parts of brief pieces in which a path moves far or conditions change.

@@ -60,7 +60,7 @@ class Posed:
 
     @cached_property
     def bounds(self) -> Bounds | None:
-        """What each zero requires, V; None where motors alone have no bounded motion."""
+        """Voltages, V, that each zero of the robot requires; None where motors alone have no bounded motion."""
         try:
             return bounds_of_zeros(self.asked, self.linear, self.around)
         except SolveError:

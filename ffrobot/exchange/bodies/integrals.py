@@ -67,7 +67,7 @@ class ShapeIntegrals:
 
     @property
     def gyroscopic(self) -> Array:
-        """Return G_r (3, 3, n), √kg·m."""
+        """Return G_r (3, 3, n) = 2 (Ī_aa 1 − Īᵀ), √kg·m: the gyroscopic moment is G_r q̇ ω."""
         I_bar = self.I_bar
         return 2 * (np.trace(I_bar) * np.eye(3)[:, :, None] - I_bar.transpose(1, 0, 2))
 
