@@ -21,7 +21,7 @@ def revolute(name, inner, outer, axis=Z, **keys):
 
 
 def scene(bodies, joints, *analyses, gravity=DOWN, **tables):
-    return planar(bodies, joints, *analyses, gravity=gravity, space="spatial", **tables)
+    return planar(bodies, joints, *analyses, gravity=gravity, **{"space": "spatial"} | tables)
 
 
 def planar(bodies, joints, *analyses, gravity=(0.0, -9.81), **tables):

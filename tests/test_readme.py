@@ -171,7 +171,7 @@ FACTS = {  # text of the README, and its numbers by their source
         scene("arm_6r")["payload"][0]["mass"], *printed("arm_6r", r"motion\.gif.*--scale (\d+)")),
     r"settles in ([\d.]+) s in the model and in ([\d.]+) s": lambda: measured_beam()[:2],
     r"settles in ([\d.]+) s, measured ([\d.]+) s; lowest frequency ([\d.]+) % high": measured_beam,
-    r"independent code \| (1e-\d) of each peak in motions": lambda: (test_two_link.RELATIVE,),
+    r"independent code \| (1e-\d) of each peak in motions": lambda: (test_two_link.RELATIVE["two_link"],),
     r"fourteen 3D cases \S+ \S+ \S+ code \| (1e-\d) of each peak": lambda: (
         {14: 1e-6}[len(list((ROOT / "tests" / "checkpoints" / "spatial").glob("*.json")))],),
     r"within (\de-\d) of its peak \| ([\d.]+) s on one core": benchmark,
