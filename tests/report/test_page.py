@@ -22,7 +22,7 @@ def played(browser, path):
     """Open a page, which plays by itself, and stop it."""
     browser.open(path, playing=True)
     browser.wait("state.playing && state.t > 0", WAIT)
-    at, before = browser.value("state.t"), trace(browser, 2)
+    before, at = trace(browser, 2), browser.value("state.t")
     browser.wait(f"Math.abs(state.t - {at}) > 0.02", WAIT)
     browser.run("play(false)")
     browser.wait("!state.showing", WAIT)
