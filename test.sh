@@ -25,9 +25,10 @@ check "ruff format" .venv/bin/ruff format --diff --quiet .
 check "clang-format" .venv/bin/clang-format --dry-run --Werror "${cpp[@]}"
 
 status=0
-# A process for each core; a file's tests share one, and what it sets up. -n 0 among the arguments: one after the other.
+# A process for each core, and one more, as commands and browsers wait; a file's tests share one, and what it sets up.
+# -n 0 among the arguments: one after the other.
 # build/tests.xml keeps what each test took.
-.venv/bin/python -m pytest -n auto --dist loadfile --junitxml build/tests.xml "$@" || status=$?
+.venv/bin/python -m pytest -n "$(($(nproc) + 1))" --dist loadfile --junitxml build/tests.xml "$@" || status=$?
 .venv/bin/python scripts/test_costs.py build/tests.xml
 check "mypy" wait "$mypy"
 cat build/types.txt
