@@ -107,7 +107,7 @@ import os
 from ffrobot.common.parallel import without_daemon
 without_daemon()
 from mpi4py import MPI
-print(MPI.COMM_WORLD.size)
+print(MPI.COMM_WORLD.size, flush=True)
 os._exit(0)
 """
 
