@@ -40,7 +40,7 @@ def test_one_patch_on_a_strip(strip, name, close, of_charge):
     electric charge the model holds all patches across, while the strip gives way.
     """
     start, end, t, w, offset = PLACES[name]
-    solid = SolidStrip(STRIP, CERAMIC | {"place": PLACES[name]}, size=0.005)
+    solid = SolidStrip(STRIP, CERAMIC | {"place": PLACES[name]}, size=0.0075)
     keys = {
         "body": "link", "centers": ((start + end) / 2,), "length": end - start, "thickness": t, "width": w,
         "offset": offset, "face": "+y", "modulus": CERAMIC["E"], "d31": CERAMIC["d31"], "density": CERAMIC["rho"],
