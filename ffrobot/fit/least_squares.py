@@ -118,7 +118,7 @@ def fit_frequencies(
     if len(measured) < len(keys):
         raise InputError(
             "fit: expected at least as many measured frequencies as keys to vary",
-            f"{len(measured)} of {', '.join(labels)} for {len(keys)}: {', '.join(keys)}",
+            f"{len(measured)} of {', '.join(labels) or 'no mode'} for {len(keys)}: {', '.join(keys)}",
         )
     weight = 1.0 if uncertainty is None else measured / uncertainty
 
