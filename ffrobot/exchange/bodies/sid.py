@@ -193,7 +193,6 @@ def _checks(modal: Modal, integrals: ShapeIntegrals) -> Iterator[str]:
             yield f"{name}: off {what} by {error:.2g}, of {np.abs(expected).max():.2g} at most"
 
 
-ENTRY = re.compile(r"m([01])\s*\(([\s\d,]+)\)")
 MOST = 10**7  # entries of a matrix: a file that asks for more is damaged
 SYMMETRIC, IDENTITY = 2, 4  # values of `structure`
 

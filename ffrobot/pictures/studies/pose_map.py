@@ -69,7 +69,7 @@ def _draw(pose_map: PoseMap, quantity: Quantity) -> Figure:
     if len(long) == 2:
         _heat_map(figure.add_subplot(1, 2, 1), pose_map, quantity, long)
     elif len(long) == 1:
-        _curve(figure.add_subplot(1, 2, 1), pose_map, quantity, long[0])
+        _curve(figure.add_subplot(1, 2, 1), quantity, long[0])
     axes = figure.add_subplot(1, 2, 2) if len(long) < 3 else figure.subplots()
     _workspace(axes, pose_map, quantity, has_bar=len(long) > 2)
     return figure
@@ -91,7 +91,7 @@ def _heat_map(axes: Axes, pose_map: PoseMap, quantity: Quantity, long: list[Grid
         axes.set_aspect("equal")
 
 
-def _curve(axes: Axes, pose_map: PoseMap, quantity: Quantity, axis: GridAxis) -> None:
+def _curve(axes: Axes, quantity: Quantity, axis: GridAxis) -> None:
     x = _in_units(axis)
     axes.plot(x, quantity.values)
     for number, color, marker in _marks(quantity):
