@@ -1,7 +1,5 @@
 """Motors of a catalog that suffice for the task of a joint. SI units."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple

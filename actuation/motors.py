@@ -1,7 +1,5 @@
 """Requirements on motors over time against their limits: peaks, root mean squares, torques at rest."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Names for the types of arrays, in annotations (shapes and units stand in docstrings); null spaces."""
 
-from __future__ import annotations
-
 from typing import Any, TypeVar, cast
 
 import numpy as np

@@ -3,8 +3,6 @@
 Others could put code there that runs (compiled forms), or numbers that count (modal bodies, meshes).
 """
 
-from __future__ import annotations
-
 import atexit
 import os
 import shutil

@@ -4,8 +4,6 @@ The checksum stands behind the end of the HDF5 file, where HDF5 itself does not 
 which takes a few percent of the time of reading. Libraries that change such a file cut the line off.
 """
 
-from __future__ import annotations
-
 import re
 import zlib
 from pathlib import Path

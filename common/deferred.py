@@ -1,7 +1,5 @@
 """Validators and schemas that are built when they are used: files have few of the kinds of tables that there are."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """The two ways a run can fail, each with the exit code of the command line, and words of their messages."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager

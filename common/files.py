@@ -1,7 +1,5 @@
 """Writing files so that a failure leaves either the old file or the new one, never half of it."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """How processes end: Ctrl-C and SIGTERM are answered by an exception, later, or at once, by the end of the process."""
 
-from __future__ import annotations
-
 import atexit
 import os
 import signal

@@ -4,8 +4,6 @@ Names are of all scripts, but such that they fit messages, datasets, file names.
 keys: see `tables.beyond_limits`.
 """
 
-from __future__ import annotations
-
 import unicodedata
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Libraries that only some runs need: imported when one of their names is used; what to say where one is missing."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module

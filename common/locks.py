@@ -1,7 +1,5 @@
 """Locks that end with the process that holds them, and names of processes that are never used again."""
 
-from __future__ import annotations
-
 import os
 import platform
 import time

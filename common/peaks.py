@@ -1,7 +1,5 @@
 """Largest values and root mean squares of what is known at some times, between these times too."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .arrays import Array

@@ -1,7 +1,5 @@
 """Which Python files a scene may run, what these import, and digests of functions."""
 
-from __future__ import annotations
-
 import hashlib
 import sys
 import sysconfig

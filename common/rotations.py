@@ -3,8 +3,6 @@
 φ~ is the matrix of the cross product. A section turns by exp φ~ (docs/theory.md), with Ω = J_l φ̇.
 """
 
-from __future__ import annotations
-
 from math import factorial
 
 import numpy as np

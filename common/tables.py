@@ -1,7 +1,5 @@
 """Tables as TOML and CSV have them: where in a file a key is, limits of what any file may contain, cells as text."""
 
-from __future__ import annotations
-
 import csv
 import io
 import re

@@ -1,7 +1,5 @@
 """TOML and CSV files: whatever is wrong with one that is read comes as an `InputError` in its name."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re

@@ -1,7 +1,5 @@
 """The version of the program, and hashes of its code and of what files contain."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from functools import cache

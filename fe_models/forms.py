@@ -3,8 +3,6 @@
 Forms of other orders and cells are compiled when a link first needs them, and kept in the user's cache.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

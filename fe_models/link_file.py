@@ -1,7 +1,5 @@
 """The link file: read, and checked for all that one key alone cannot tell (the records check the keys)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import chain, pairwise
 from math import isclose

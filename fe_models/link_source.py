@@ -1,7 +1,5 @@
 """Where the keys of a link are: in a link file, or elsewhere, as a table of a scene or a dictionary of Python."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass

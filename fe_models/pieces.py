@@ -5,8 +5,6 @@ space one of each plane of bending) and the static shapes of what their neighbor
 of a piece turns with it, and leaves small deflections and few steps (docs/theory.md, Links in pieces).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from math import ceil
 from pathlib import Path

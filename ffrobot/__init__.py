@@ -13,8 +13,6 @@ From Python, everything the command line does takes a line each:
 Names are loaded when they are first used: importing the package costs a few milliseconds.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING
 

@@ -1,7 +1,5 @@
 """The command line: its commands, and how a command ends."""
 
-from __future__ import annotations
-
 import gc
 import os
 import signal

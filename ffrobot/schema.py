@@ -4,8 +4,6 @@ Editors complete and check TOML files by them, and show what a key means. What t
 joint has no axis) is beyond a schema: the records and the readers of the files say so.
 """
 
-from __future__ import annotations
-
 import ast
 import inspect
 import json

@@ -7,8 +7,6 @@ memory. Requests and answers are lines of JSON on the standard streams, `{"argum
 error stream is that of this process.
 """
 
-from __future__ import annotations
-
 import gc
 import json
 import os

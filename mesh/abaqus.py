@@ -4,8 +4,6 @@ What makes or moves nodes and elements is read, or rejected by keyword and line;
 sections, loads, steps) the link file says. Elements beside solids are left out, and said to be.
 """
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """What must hold for a part's mesh before anything is computed on it, and what can be mended."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -3,8 +3,6 @@
 NumPy is not needed: input hashes are made of `files_of`.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Iterator

@@ -3,8 +3,6 @@
 The faces are those that interfaces of a link choose from (`faces.PartBoundary.smooth_faces`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -6,8 +6,6 @@ Cards are of fixed or free field, of 8 or 16 columns, with continuations: see "F
 Reference Guide of MSC Nastran.
 """
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence

@@ -3,8 +3,6 @@
 Runs on one process; gmsh and meshio are loaded where they are used.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from math import prod

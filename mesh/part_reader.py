@@ -5,8 +5,6 @@ The process takes a pickled function with its arguments, and hands back what com
 parent, and at a limit of processor time.
 """
 
-from __future__ import annotations
-
 import os
 import pickle
 import resource

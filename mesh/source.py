@@ -3,8 +3,6 @@
 Names of element types are meshio's; nodes are in gmsh's order.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 

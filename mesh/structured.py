@@ -1,7 +1,5 @@
 """Nodes along the axis of a link; structured meshes of boxes: hexahedra, or six tetrahedra in place of each."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 

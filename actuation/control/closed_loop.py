@@ -1,7 +1,5 @@
 """Forward dynamics under sampled controllers: sensors, delay, saturation, feed-forward, disturbances."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import redirect_stdout, suppress
 from copy import copy

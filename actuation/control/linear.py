@@ -1,7 +1,5 @@
 """Linear models about an equilibrium or a motion: the analysis `kind = "linear"`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import combinations, groupby

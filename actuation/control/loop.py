@@ -1,7 +1,5 @@
 """The sampled loop that the core calls, and the record of a run: samples, metrics, margins, advice. SI units."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 

@@ -8,8 +8,6 @@ The metrics are continuous in the motion, so that they do not depend on the step
 decides. They are read at times independent of the steps (`watched`), and all fits count, by what they leave.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What controllers ask of a robot: names, sensors, links, patches, linear and rigid models, what they are made with."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property

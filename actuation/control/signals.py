@@ -1,7 +1,5 @@
 """Readings of sensors by name, as in linear models: joints, motors, points, patches, modes. SI units."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import field
 

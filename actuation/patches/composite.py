@@ -19,8 +19,6 @@ shifts the neutral axis, but no other mode feels them. On named faces all strain
 face stretch the link, too, and those off the middle of the width bend it about both axes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple

@@ -5,8 +5,6 @@ by those on ±z, torsion by fibers at an angle, the axial family by one named fa
 other families unmet.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -9,8 +9,6 @@ and have the stress C (ε, γ) − C Λ V (`Lamina`). By virtual work their load
 with the rows B of these strains. Voltages on both faces are opposite to bend, and alike to twist.
 """
 
-from __future__ import annotations
-
 from functools import cached_property, lru_cache
 from typing import Literal
 

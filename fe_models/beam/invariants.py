@@ -18,8 +18,6 @@ K of a moment belongs to the rotation vector. Sections are rigid and the axis ke
 have besides, N (I_p/A) φ'² of fibers that twist shortens, is left out, as in the rods of Kirchhoff and Reissner.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Piecewise polynomials along the axis of a beam, and their exact integrals. NumPy and SciPy only. SI units."""
 
-from __future__ import annotations
-
 from math import perm
 
 import numpy as np

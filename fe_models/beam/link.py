@@ -1,7 +1,5 @@
 """From a beam's link file to its modal body: mesh, modes, their sign, integrals."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

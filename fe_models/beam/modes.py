@@ -1,7 +1,5 @@
 """Modes of a beam: the lowest of K x = ω² M x, attachment modes, and those with fixed interfaces (Craig–Bampton)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple

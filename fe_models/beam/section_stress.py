@@ -4,8 +4,6 @@ Normal stress is linear over the section. Shear stress of a transverse force is 
 through the point across the force (Timoshenko, Strength of Materials I, §26); of a torque, St Venant's.
 """
 
-from __future__ import annotations
-
 from math import hypot, pi
 
 import numpy as np

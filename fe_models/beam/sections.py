@@ -1,7 +1,5 @@
 """Properties of the sections of a beam, by element and by family of motion, and outlines for pictures."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -7,8 +7,6 @@ attachment modes it is that of eigenmodes, beside the loads at interfaces that t
 section forces are those of statics: the link, supported isostatically, has no others.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A table of measured modes: natural frequencies and damping ratios, as link files and `ffrobot fit` take them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import isfinite
 from pathlib import Path

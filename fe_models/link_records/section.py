@@ -1,7 +1,5 @@
 """Properties of beam cross sections, in the link frame: x along the axis, y in-plane, z out of plane. SI units."""
 
-from __future__ import annotations
-
 from math import pi, tanh
 
 from ...common.structs import struct

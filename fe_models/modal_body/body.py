@@ -1,7 +1,5 @@
 """The modal body: all that the dynamics knows of a flexible link. NumPy only; no finite element library is needed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import zip_longest

@@ -10,8 +10,6 @@ floating frame, all p with XᵀMX = I and K = diag(ω²), that span ψ and φ: a
 place of attachment modes. The way back, p = T (d, η), follows from what they do at interfaces.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ modal stiffness alone (Friswell and Mottershead, Finite Element Model Updating i
 Stresses per unit of a mode go with its stiffness, so that those under a constant load stay what equilibrium asks for.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a modal body is made of: inertia, interfaces, stations, what pictures and stresses need. NumPy only."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from types import MappingProxyType

@@ -9,8 +9,6 @@
 | `moment/NAME/x` … | unit moment there |
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Hooke's law of the materials of a solid, in the axes of the link. NumPy only."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -13,8 +13,6 @@ and −½ pᵀK p of the load, K = ∫ σ⁰ ∂Φ ∂Φ dV, is the work on both
 interface's center and to the rotation vector of its section, by which the equations of motion place it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The worker of a thread: a process (`ffrobot.worker`) in which it solves scenes, one after the other."""
 
-from __future__ import annotations
-
 import json
 import os
 import sys

@@ -1,7 +1,5 @@
 """Where errors come from: mesh, number of modes and time integration, each refined alone."""
 
-from __future__ import annotations
-
 from math import ceil
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Run time against error: a reference, and a sweep over integrators and tolerances."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

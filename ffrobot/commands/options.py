@@ -1,7 +1,5 @@
 """Types of options, and options that commands which make many runs share."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from collections.abc import Callable, Iterable, Sequence

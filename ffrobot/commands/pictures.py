@@ -1,7 +1,5 @@
 """The commands `plot`, `view` and `report`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any

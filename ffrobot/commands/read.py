@@ -1,7 +1,5 @@
 """The commands that say what files hold: `info`, `feasibility`, `linear` and `pose`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import click

@@ -4,8 +4,6 @@ The derivative is that of the polynomial through the values, exact for n − 1 a
 Computation 51, 1988): with steps h, h/2 and h/4 to both sides Richardson's extrapolation, of order h⁶.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations

@@ -1,7 +1,5 @@
 """Designs of one scene: values of keys, a run for each (stored and reused as in sweeps), and its responses."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager

@@ -16,8 +16,6 @@ second differences take the curvature out of later one-sided ones. Peaks are fol
 theorem).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path

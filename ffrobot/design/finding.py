@@ -1,7 +1,5 @@
 """What the design commands find, whatever it is: printed, written as tables and drawn in one way."""
 
-from __future__ import annotations
-
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Sequence

@@ -4,8 +4,6 @@ A design that fails reads as far worse than the last one that did not, with its 
 trust-constr's radius then shorten the step towards that one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass

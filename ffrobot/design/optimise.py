@@ -9,8 +9,6 @@ The Pareto front of two responses, the least of one for each value of the other,
 is limited, in equal ratios where both ends have one sign. Each search begins at its neighbor's design.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace

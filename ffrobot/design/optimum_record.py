@@ -1,7 +1,5 @@
 """The best design as it was found: values, limits that are reached with their prices, files, the text of it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path

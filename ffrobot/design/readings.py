@@ -5,8 +5,6 @@ Danskin 1966), as long as no other time overtakes it. The time is that of the to
 between outputs.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from typing import Literal

@@ -1,7 +1,5 @@
 """Scalars that a design is judged by, with limits: what `--of`, `--minimise` and `--subject-to` may say."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from contextlib import suppress

@@ -11,8 +11,6 @@ integrated with a tighter tolerance than the scene's. Where errors are above `AI
 steps of a quarter follow, twice at most.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -5,8 +5,6 @@ every key A with that column from B: Sobol indices need no other runs. Gradients
 standard deviation to both sides; what these say of curvature is the estimate of the error.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

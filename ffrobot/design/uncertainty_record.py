@@ -1,7 +1,5 @@
 """What `ffrobot uncertainty` has found, as texts, tables and diagrams."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path

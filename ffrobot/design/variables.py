@@ -4,8 +4,6 @@ A place u has a coordinate for each variable: of a number its way from the lower
 catalog the number of the row, from 0.
 """
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """`ffrobot export`, and `ffrobot import` of bodies: which format takes which file, and how it is written."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path

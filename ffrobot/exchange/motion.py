@@ -1,7 +1,5 @@
 """Motions of joints: those of results for other programs, and those that other programs planned or recorded."""
 
-from __future__ import annotations
-
 import json
 import math
 import tempfile

@@ -1,7 +1,5 @@
 """`ffrobot link PART.step --inspect`: a draft of a link file for a part, with its faces as interfaces."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Covariance of fitted parameters in a file, and deviations of stable depths of cut over a map by it."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial

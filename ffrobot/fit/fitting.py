@@ -1,7 +1,5 @@
 """`ffrobot fit`: measured frequencies of a link or a robot, the keys to vary, and the new files."""
 
-from __future__ import annotations
-
 import json
 import re
 import tomllib

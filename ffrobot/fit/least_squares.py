@@ -5,8 +5,6 @@ relative uncertainty s_i of the measured f_i, or 1 where none is known. With J =
 is σ² (JᵀJ)⁻¹, where σ² is 1 with known uncertainties and else |r|²/(m − n) (Seber and Wild, Nonlinear Regression, 2.1).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

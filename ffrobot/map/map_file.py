@@ -1,7 +1,5 @@
 """The files of a map, map.h5 with all arrays over the grid, table.csv with a line for each pose; what is printed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple

@@ -5,8 +5,6 @@ joints: each moves with the point that carries it, along a tree of joints that s
 drawn in 3D: they move in z = 0 and turn about z.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Movies from pictures: GIF through Pillow, MP4 (H.264) through ffmpeg, which is given the pictures as they come."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import tempfile

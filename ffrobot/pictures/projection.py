@@ -1,7 +1,5 @@
 """Where the viewer stands: before a link, before a planar scene, or before a 3D one; marks there, and colors."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a solve prints with `--verbose`: everything that its summary leaves out."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 

@@ -3,8 +3,6 @@
 The library logs to loggers named as its modules, below "ffrobot", and leaves it to others what becomes of that.
 """
 
-from __future__ import annotations
-
 import logging
 import os
 import platform

@@ -1,7 +1,5 @@
 """Joints as the scene text of a results file has them: coordinates, units, limits of motors, planar and 3D."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

@@ -4,8 +4,6 @@ On Ctrl-C and where `max_steps` is used up, the results file keeps what the next
 it (`is_resumable`) go on from there, or are taken over where they are complete; all others are run again.
 """
 
-from __future__ import annotations
-
 import json
 import time
 import tomllib

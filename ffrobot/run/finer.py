@@ -1,7 +1,5 @@
 """`check = "finer"`: an inverse analysis replayed on links with twice the modes, which holds the error of too few."""
 
-from __future__ import annotations
-
 import logging
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Everything a scene is made from: the files it names, directly or through its links, and fingerprints of them all."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path

@@ -3,8 +3,6 @@
 The first solves are cheap: few modes leave out the high frequencies, which hold the steps down.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Links in pieces: what their pieces are, how far they bend, how many are enough, and the whole links' motion."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """What is left of a computed motion where the robot is not its model: a table of simulations, of one cause each."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial

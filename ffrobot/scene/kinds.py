@@ -1,7 +1,5 @@
 """THE list of kinds of analysis. A new kind is one file with its record and what it runs, and one entry here."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from ..common.deferred import Deferred

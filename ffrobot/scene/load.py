@@ -1,7 +1,5 @@
 """Loading a scene from a file or from Python: syntax, keys, and that everything it refers to exists."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from os import PathLike

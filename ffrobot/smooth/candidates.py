@@ -6,8 +6,6 @@ Inversion leads motors by what strains their gears, K⁻¹τ, through the invers
 with the linear models of postures along the path; what they find is simulated.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 from typing import TypeVar

@@ -1,7 +1,5 @@
 """What makes a robot vibrate under a stream of set points: faults of the stream, or what it excites, joint by joint."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What `ffrobot smooth` prints and draws, and its page: the stream, its faults, tables of joints and of new motions."""
 
-from __future__ import annotations
-
 from base64 import b64encode
 from collections.abc import Iterator
 from hashlib import sha256

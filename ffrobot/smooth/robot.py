@@ -1,7 +1,5 @@
 """A robot whose motors follow set points: its vibrations in the postures of a motion, and what is left at its tool."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

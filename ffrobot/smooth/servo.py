@@ -4,8 +4,6 @@ Each axis is taken as θ_r = G θ_cmd, which loads do not disturb. Between two s
 as controllers of robots interpolate a stream. G is of a bandwidth, of polynomials, or fitted to a measured response.
 """
 
-from __future__ import annotations
-
 from functools import partial, reduce
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`ffrobot smooth`: from a scene and a recorded motion to what makes the robot vibrate."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Scene and link files of single runs: the user's, with some keys changed and all file names made absolute."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Mapping, Sequence
 from copy import deepcopy

@@ -1,7 +1,5 @@
 """One run of a sweep and the row that it leaves."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

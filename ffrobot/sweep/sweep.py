@@ -1,7 +1,5 @@
 """A sweep from its plan to its table; what is finished is not run again."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -1,7 +1,5 @@
 """Fully constrained inverse dynamics (Shabana 2022, sec. 5.1): p(t) is prescribed too, and everything is algebraic."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Forward dynamics under given loads, and under the actuation that an inverse analysis found."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import count

@@ -1,7 +1,5 @@
 """Equilibrium; and states about which a robot is linear: it, or instants of an earlier analysis. SI units."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

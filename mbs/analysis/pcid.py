@@ -1,7 +1,5 @@
 """Partially constrained inverse dynamics: joints and trajectories hold, p is free (Shabana 2022, sec. 5)."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from ..linear.statics import hanging_joints, initial_state

@@ -4,8 +4,6 @@ They are read with Python's parser, never evaluated by Python: a whitelist of sy
 core's instructions, which carry exact first and second time derivatives.
 """
 
-from __future__ import annotations
-
 import ast
 import math
 import re

@@ -1,7 +1,5 @@
 """Functions of time, and forces by the motion of a point, that a user gives in Python; the checks of their values."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Annotated
 

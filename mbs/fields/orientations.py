@@ -1,7 +1,5 @@
 """Orientations that are specified over time: by rotation vectors, by roll, pitch and yaw, or by one direction."""
 
-from __future__ import annotations
-
 from functools import cached_property
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """How planar scenes write what records hold in 3D: fewer components, other keys. Dimension is data of a field."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass

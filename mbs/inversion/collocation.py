@@ -8,8 +8,6 @@ their side of the imaginary axis (van der Houwen, Sommeijer and Nguyen huu Cong 
 p̈ for a moment, as where a zero passes through infinity.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 

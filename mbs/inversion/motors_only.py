@@ -5,8 +5,6 @@ half plane. `output = "redefined"` follows it with a point nearer the joints, an
 the part of the vibration that the output does not see.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Sequence

@@ -7,8 +7,6 @@ problem at once, on intervals that are cut where r(t) ≠ 0 between the collocat
 initial value problem, solved window by window, each with intervals as short as r(t) asks for.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from itertools import pairwise

@@ -7,8 +7,6 @@ What decays follows from the past, what grows from the future (Devasia, Chen and
 whose zeros may cross the imaginary axis along the path, follow from the past unless they grow too far.
 """
 
-from __future__ import annotations
-
 from functools import cached_property
 
 import numpy as np

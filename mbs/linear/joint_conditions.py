@@ -5,8 +5,6 @@ With the coordinates of motors fixed, R δs = 0, the linear equations M δs̈ + 
     NᵀM N δz̈ + NᵀD N δż + NᵀK N δz = NᵀF,      compliance at a point with δx = J δs:  C = J N (NᵀK N)⁻¹ NᵀJᵀ.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple

@@ -10,8 +10,6 @@ Held are the forces along s that drive the motion; moments of motors that turn f
 these do on modes turns with the sections at them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a robot is like in one posture: torques, sag, natural frequencies, stiffness, manipulability, response."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np

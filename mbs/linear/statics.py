@@ -9,8 +9,6 @@ The core has K from dual numbers. λ are at every step those of least squares at
 Optimization, 2006, sec. 18.3), so that nothing adds up in them; of equations that depend on others there they are 0.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 

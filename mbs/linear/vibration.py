@@ -1,7 +1,5 @@
 """Small vibrations of an assembly about rest, and along a path, under its constraints; damping wanted of them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise

@@ -6,8 +6,6 @@ They are coordinates of a joint where modes turn its sections about its axis alo
 none: a moment between frames has virtual work there, but no angle that goes with it.
 """
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

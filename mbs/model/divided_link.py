@@ -6,8 +6,6 @@ moments at its ends, the rotations of its ends are then those of the link (what 
 static shape does no work with that load), and so are turns of sections from cut to cut along the whole link.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 

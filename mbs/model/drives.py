@@ -1,7 +1,5 @@
 """Forces of time that act on a robot beside gravity, elasticity and constraints. SI units."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple

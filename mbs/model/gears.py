@@ -3,8 +3,6 @@
 Motors behind compliant gears are coordinates of their own, with springs to those of the joints.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 

@@ -7,8 +7,6 @@ and no freedom, is exact, whatever inertia it has. What rigid bodies carry, and 
 parts of their body.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """What motors and modal forces do in place of the forces on a path: the split of generalized forces. SI units."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """What trees are made of: bodies on their joints, sections of bodies, and rows of constraints between these."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 

@@ -11,8 +11,6 @@ that close loops, which hold by themselves. Joints carry it all the same: reacti
 from the motion, with the masses where they are in space.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from types import MappingProxyType

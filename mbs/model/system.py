@@ -1,7 +1,5 @@
 """The equations of motion of a scene under its constraints, as the core's recursion evaluates them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cached_property
 from typing import NamedTuple

@@ -12,8 +12,6 @@ Right and left are those of C. S. G. Lee and M. Ziegler, Geometric approach in s
 robots, IEEE Transactions on Aerospace and Electronic Systems 20 (1984) 695–706.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from itertools import pairwise
 from typing import NamedTuple

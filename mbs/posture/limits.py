@@ -5,8 +5,6 @@ joints at which loops are cut have no coordinate in the tree, and those of plana
 entries of the state. Of a motion that the core does not integrate all are looked at, at all times that are given.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """The undeformed robot where its path begins: what inverse analyses start from."""
 
-from __future__ import annotations
-
 from ...common.structs import struct
 from ..model.gears import with_prescribed_motors
 from ..model.known_motion import State

@@ -1,7 +1,5 @@
 """Postures of a robot: how it can move there, what to say of singular ones and of jumps. SI units."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path

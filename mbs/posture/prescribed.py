@@ -1,7 +1,5 @@
 """Motion that is wholly prescribed, by the core: modal coordinates by functions of time, joints by paths. SI units."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import NamedTuple
 

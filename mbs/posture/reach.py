@@ -1,7 +1,5 @@
 """What to say where the links do not reach a path: how far it is, how far they reach, and a guess that works."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ joints those that tell the motion left free best then follow it, as joints that 
 links these and the path are followed exactly.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations, pairwise

@@ -1,7 +1,5 @@
 """The posture that a robot starts from: the guess of joint coordinates, then Newton on the rows."""
 
-from __future__ import annotations
-
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import replace
 from typing import Literal

@@ -1,7 +1,5 @@
 """Postures of a robot over a grid of joint coordinates, or of places of a point, on the branch of its start."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple

@@ -9,8 +9,6 @@ the same energy, ends where its sections, each turned from the last, take it (Si
 measured factor. What bending in one plane, at whatever angle, leaves is far less than what bending in two or twist do.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ what else acts there (Newton and Euler, in the core). Where motors carry the mot
 along its trajectories: loops then transmit their share of M v̇ − Q (`split_forces`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 
 import numpy as np

@@ -6,8 +6,6 @@ Constraints of loops depend on each other where rigid links constrain a motion t
 joints and modes, multipliers λ0 with C_vᵀ λ0 = 0 change reactions without changing the motion.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

@@ -3,8 +3,6 @@
 All arrays are over the output times (T, …), SI units.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

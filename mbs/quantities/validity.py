@@ -7,8 +7,6 @@ know to second order where geometric stiffening is on; a cantilever, whose frame
 than a link on simple supports.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from math import ceil, sqrt
 

@@ -1,7 +1,5 @@
 """What an analysis may use when it runs. SI units."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, field
 from typing import Protocol, TypeVar

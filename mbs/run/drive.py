@@ -1,7 +1,5 @@
 """Running the integrators of the core from an initial state to an outcome: all kinds that integrate do it here."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace

@@ -7,8 +7,6 @@ Peaks of an arm that rings are right to 1e-5, means over time to 1e-4, whatever 
 that last 1e-4 of the run to 1e-2 (tests/mbs/test_peaks_between_outputs.py).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ alone, so they end where these change briefly: a pulse that lasts 1.5e-4 of the 
 (tests/mbs/test_peaks_between_outputs.py).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 

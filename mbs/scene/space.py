@@ -3,8 +3,6 @@
 Motions are computed in 3D; those of a scene with `space = "planar"` stay in the plane z = 0 and turn about z.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import MappingProxyType
 

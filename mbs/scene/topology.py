@@ -1,7 +1,5 @@
 """Which joint carries which body: a spanning forest of the joints, and the joints that close loops."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from heapq import heappop, heappush
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """A tracking problem as posed for a scene: whether patches can do it, why not, what would do instead, and warnings."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property

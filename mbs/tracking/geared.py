@@ -6,8 +6,6 @@ twist is that of K δ + D δ̇ = τ_s, and the motor supplies I δ̈ more, I = J
 the rotor is 1/N of that: with twists that are found without it, voltages and torques make up for it.
 """
 
-from __future__ import annotations
-
 import copy
 from dataclasses import KW_ONLY, fields, replace
 

@@ -8,8 +8,6 @@ correctors for longer steps (Gondzio, Comput. Optim. Appl. 6, 1996). Newton's eq
 x_1, λ_1 …) are banded, and factorized with pivoting: growing and decaying solutions side by side need it.
 """
 
-from __future__ import annotations
-
 from itertools import product
 from typing import NamedTuple
 

@@ -19,8 +19,6 @@ Within a path tolerance the path of points is y_d + e, and r and Ï„ contain e, Ä
 Intervals are graded at first, halved until the least voltage settles, cut until no force is left over.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

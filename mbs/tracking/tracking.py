@@ -5,8 +5,6 @@ patches can do it; where that is within their limits, the motion of least effort
 what would do beyond limits, is in `advice`; a simulation under torques alone shows whether patches are needed.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, replace

@@ -1,7 +1,5 @@
 """What a tracking problem asks for, a transition from rest to rest within limits, and the motion that answers it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, replace
 from typing import Literal

@@ -9,8 +9,6 @@ them; the link is free in space, so that K has six eigenvalues of zero. This is 
 reduced order models and of Newton's `ModalGeneratorCraigBampton`.
 """
 
-from __future__ import annotations
-
 import io
 from typing import Any
 

@@ -6,8 +6,6 @@ which newer versions of MBDyn read. Read from these, else from the lumped masses
     Inv3 = ∫ρ Φ   Inv4 = ∫ρ x×Φ   Inv8_j = −∫ρ x~ Φ~_j   Inv5_jk = ∫ρ Φ_j×Φ_k   Inv9_jk = ∫ρ Φ~_j Φ~_k
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """What FMUs (FMI 2.0) say of themselves, and the archive that they are in."""
 
-from __future__ import annotations
-
 import re
 import zipfile
 from collections.abc import Iterable, Mapping

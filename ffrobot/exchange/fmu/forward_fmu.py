@@ -1,7 +1,5 @@
 """`ffrobot export SCENE.toml --format fmu`: a forward motion as an FMU for co-simulation."""
 
-from __future__ import annotations
-
 import logging
 import platform
 import sys

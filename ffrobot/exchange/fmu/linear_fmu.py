@@ -1,7 +1,5 @@
 """`ffrobot export`: the linear model of an analysis, or the controller of a loop, as an FMU or as numbers in C."""
 
-from __future__ import annotations
-
 import os
 import platform
 import shlex

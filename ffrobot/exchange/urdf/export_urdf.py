@@ -1,7 +1,5 @@
 """`ffrobot export SCENE.toml --format urdf`: a scene in space as a URDF, its links rigid, for viewers."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`ffrobot import ROBOT.urdf -o DIR`: from a URDF to a scene in space, with link files of flexible links."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """From a URDF to a scene in space: links that fixed joints hold together are one body, the root stands still."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """The robot in figures: at selected times with the paths of points, its mode shapes, and its frequency responses."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Movies of an analysis by matplotlib: the bodies in motion, as deformed as can be seen, with the paths of points."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import cast

@@ -1,7 +1,5 @@
 """From a results file, or a modal body file, to a folder of figures."""
 
-from __future__ import annotations
-
 import fnmatch
 import warnings
 from collections.abc import Collection, Iterator, Sequence

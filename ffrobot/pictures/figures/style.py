@@ -1,7 +1,5 @@
 """How figures look, and parallel projection on plain axes: matplotlib's third dimension squeezes thin bodies."""
 
-from __future__ import annotations
-
 import re
 import textwrap
 from contextlib import AbstractContextManager

@@ -1,7 +1,5 @@
 """Charts as Plotly's JavaScript takes them; time histories of every file, laid over each other."""
 
-from __future__ import annotations
-
 from base64 import b64encode
 from collections import Counter
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """What the page needs to draw every body at any output, as deformed as asked, and every link in its modes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import count
 from typing import Any

@@ -1,7 +1,5 @@
 """From results files to one HTML file that needs no network."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from base64 import b64encode

@@ -1,7 +1,5 @@
 """Diagrams of a study as figures, of files and of the page of a report."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

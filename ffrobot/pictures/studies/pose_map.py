@@ -1,7 +1,5 @@
 """Pictures of a map: each quantity over the grid in color, with the robot in its worst and in its best pose."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

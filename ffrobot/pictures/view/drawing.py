@@ -1,7 +1,5 @@
 """What PyVista draws of grids: `main` is a process of its own (`view.draw_pictures`)."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Sequence

@@ -4,8 +4,6 @@ Grids are VTK's unstructured ones in HDF5, written without VTK (docs.vtk.org, "V
 2.0; ParaView reads it from 5.12 on): cells once, points and their data once for each time step.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
