@@ -11,7 +11,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from ..common.arrays import Array, as_floats
+from ..common.arrays import Array
 from ..sweep.sweep import Key
 from .designs import Point, moved
 from .readings import Reading, Response
@@ -35,7 +35,7 @@ def weights(offsets: Array) -> Array:
     powers = np.vander(offsets / size, increasing=True).T
     first = np.zeros(len(offsets))
     first[1] = 1.0
-    return as_floats(np.linalg.solve(powers, first) / size)
+    return np.linalg.solve(powers, first) / size
 
 
 def derivative(offsets: Array, values: Array) -> Derivative:

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import nnls
 
-from ..common.arrays import Array, as_floats
+from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.files import write_atomically
 from ..common.tables import as_csv
@@ -318,4 +318,4 @@ def optimality(evaluations: Evaluations, design: Evaluated, slopes: Slopes) -> O
 
 
 def _largest(values: Array) -> float:
-    return float(np.abs(as_floats(values)).max(initial=0.0))
+    return float(np.abs(values).max(initial=0.0))

@@ -12,7 +12,7 @@ from math import prod
 import numpy as np
 from scipy.optimize import Bounds, NonlinearConstraint, differential_evolution, minimize
 
-from ..common.arrays import Array, as_floats
+from ..common.arrays import Array
 from ..run.watcher import Watcher
 from .designs import SpentError
 from .evaluations import Differentiation, Evaluated, Evaluations, Optimality, optimality
@@ -86,8 +86,8 @@ class _Functions:
 
     @property
     def start(self) -> Array:
-        x = as_floats(self._place[self._free])
-        return as_floats(np.append(x, self._rows(x)[self._tops].max())) if self.has_level else x
+        x = self._place[self._free]
+        return np.append(x, self._rows(x)[self._tops].max()) if self.has_level else x
 
     @property
     def bounds(self) -> Array:
@@ -102,27 +102,27 @@ class _Functions:
         return float(x[-1]) if self.has_level else float(self._rows(x)[self._tops[0]])
 
     def objective_gradient(self, x: Array) -> Array:
-        return np.eye(x.size)[-1] if self.has_level else as_floats(self._row_gradients(x)[self._tops[0]])
+        return np.eye(x.size)[-1] if self.has_level else self._row_gradients(x)[self._tops[0]]
 
     def excesses(self, x: Array) -> Array:
         rows = self._rows(x)
         over = rows[self._tops] - x[-1] if self.has_level else np.zeros(0)
-        return as_floats(np.concatenate([rows[self._limits], over]))
+        return np.concatenate([rows[self._limits], over])
 
     def excess_gradients(self, x: Array) -> Array:
         rows = self._row_gradients(x)
         if not self.has_level:
-            return as_floats(rows[self._limits])
+            return rows[self._limits]
         chosen = [*self._limits, *self._tops]
         level = np.where(np.arange(len(chosen)) < len(self._limits), 0.0, -1.0)
-        return as_floats(np.column_stack([rows[chosen], level]))
+        return np.column_stack([rows[chosen], level])
 
     def _rows(self, x: Array) -> Array:
         evaluations = self._evaluations
         one = self._at(x)
         if not one.completed:
             worse = np.isin(np.arange(len(evaluations.problem.responses)), self._tops) * FAILED
-            return as_floats(evaluations.problem.scaled(self._good.values) + worse)
+            return evaluations.problem.scaled(self._good.values) + worse
         self.best = best_of(evaluations, [self.best, one])
         return evaluations.problem.scaled(one.values)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..common.arrays import Array, as_floats
+from ..common.arrays import Array
 from ..pictures.studies.study import (
     DesignAxis,
     Diagram,
@@ -177,7 +177,7 @@ class Optimum(Finding):
         if self.optimality is None:
             return np.full(len(self.problem.limits), np.nan)
         room = np.array([limit.sense / limit.scale for limit in self.problem.limits])
-        return as_floats(-self.optimality.limits * room / self.problem.factors(self.best.values)[0])
+        return -self.optimality.limits * room / self.problem.factors(self.best.values)[0]
 
     @property
     def bound_prices(self) -> Array:

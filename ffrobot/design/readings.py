@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..common.arrays import Array, as_floats
+from ..common.arrays import Array
 from ..common.errors import InputError, did_you_mean
 from ..common.meanings import meaning
 from ..common.peaks import root_mean_square, top_at
@@ -180,7 +180,7 @@ def read_history(results: Results, name: str, option: str) -> History:
         values = np.linalg.norm(values, axis=1, keepdims=True)
     largest, rms, mean = (float(one.max()) for one in sizes)
     unit = _unit(results, dataset).replace(" ", "·")
-    return History(name, unit, time, as_floats(values), largest, rms, mean=mean, is_in_doubt=in_doubt)
+    return History(name, unit, time, values, largest, rms, mean=mean, is_in_doubt=in_doubt)
 
 
 def read_column(results: Results, name: str, option: str) -> History:
@@ -208,7 +208,7 @@ def _power(results: Results, name: str) -> Array:
     joint = name.removesuffix(f"/{POWER}")
     rate = "motor_rate" if f"{joint}/motor_rate" in results else "rate"
     power = results.data(f"{joint}/moment") * results.data(f"{joint}/{rate}")
-    return as_floats(power.sum(axis=1, keepdims=True))
+    return power.sum(axis=1, keepdims=True)
 
 
 def _unit(results: Results, name: str) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..actuation.motor_catalog import CatalogMotor, choice_of
-from ..common.arrays import Array, as_floats
+from ..common.arrays import Array
 from ..common.errors import InputError, check_known, either, quoted
 from ..common.peaks import root_mean_square, shares
 from ..common.tables import shown
@@ -293,7 +293,7 @@ class DesignProblem:
         senses = np.array([self.sense, *(limit.sense for limit in self.limits)]) * np.sign(sizes)
         ratios = np.array(values) / sizes + of_zero
         place = np.where(of_zero, 1.0, np.maximum(ratios, LINEAR))
-        return as_floats(senses * (np.log(place) + (ratios - place) / place)), as_floats(senses / place / sizes)
+        return senses * (np.log(place) + (ratios - place) / place), senses / place / sizes
 
     def violation(self, readings: Sequence[Reading]) -> float:
         """Return the largest excess, relative to its limit; 0 if none is exceeded."""

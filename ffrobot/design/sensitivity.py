@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..common.arrays import Array, as_floats
+from ..common.arrays import Array
 from ..common.errors import InputError
 from ..pictures.studies.study import Bars, Series
 from ..sweep.files import number_at
@@ -87,9 +87,8 @@ class Sensitivity(Finding):
     def logarithmic(self) -> Array:
         """Relative sensitivities (g, k), percent of response per percent of key, θ/F ∂F/∂θ; NaN where F is 0."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            return as_floats(
-                np.where(self.value[:, None] == 0.0, np.nan, self.derivative * (self.values / self.value[:, None]))
-            )
+            ratios = self.values / self.value[:, None]
+            return np.where(self.value[:, None] == 0.0, np.nan, self.derivative * ratios)
 
     def ranked(self, g: int) -> list[int]:
         """Key numbers by decreasing influence on response g, in percent per percent, or else by derivative."""

@@ -18,7 +18,7 @@ from typing import Literal
 import numpy as np
 from scipy.special import ndtri
 
-from ..common.arrays import Array, as_floats
+from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.libraries import scipy
 from ..common.tables import shown
@@ -84,7 +84,7 @@ def statistics(values: Array) -> SpreadStatistics:
         deviation=s,
         deviation_error=np.divide(spread, 2.0 * s, out=np.zeros_like(s), where=s > 0.0),
         quantiles=np.quantile(values, p, axis=0),
-        quantile_errors=as_floats(0.5 * (high - low)),
+        quantile_errors=0.5 * (high - low),
         lowest=values.min(axis=0),
         highest=values.max(axis=0),
     )
@@ -101,7 +101,7 @@ def regression_shares(inputs: Array, outputs: Array) -> tuple[Array, Array]:
     coefficients, *_ = np.linalg.lstsq(x, y, rcond=None)
     residual = y - x @ coefficients
     explained = np.where(size > 0.0, 1.0 - np.mean(residual**2, axis=0), np.nan)
-    return as_floats(coefficients.T**2), as_floats(explained)
+    return coefficients.T**2, explained
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ def _indices(a: Array, b: Array, ab: Array) -> tuple[Array, Array]:
     with np.errstate(divide="ignore", invalid="ignore"):
         first = np.mean((b - centre) * (ab - a), axis=1) / variance
         total = 0.5 * np.mean((a - ab) ** 2, axis=1) / variance
-    return as_floats(first.T), as_floats(total.T)
+    return first.T, total.T
 
 
 WIDE = 2.0  # standard deviations of a normal key within which scenes have to make sense
@@ -170,8 +170,8 @@ class Spread:
     def values(self, u: Array) -> Array:
         """Return values (n,) of the key, in its unit, at probabilities u (n,) in (0, 1)."""
         if self.kind == "uniform":
-            return as_floats(self.mean + self.half * (2.0 * u - 1.0))
-        return as_floats(self.mean + self.deviation * ndtri(u))
+            return self.mean + self.half * (2.0 * u - 1.0)
+        return self.mean + self.deviation * ndtri(u)
 
 
 def parse_spread(text: str, path: Path) -> Spread:
@@ -238,7 +238,7 @@ class LinearSpread:
         """Shares (…, k) of the variance by key."""
         squares = self.slopes**2
         whole = squares.sum(axis=0)
-        return as_floats(np.divide(squares, whole, out=np.zeros_like(squares), where=whole > 0.0).T)
+        return np.divide(squares, whole, out=np.zeros_like(squares), where=whole > 0.0).T
 
     def statistics(self) -> SpreadStatistics:
         """Return statistics of the linear part; curvatures give the errors.
@@ -257,11 +257,11 @@ class LinearSpread:
         reach = np.tensordot(ends, np.abs(self.slopes), 1)
         return SpreadStatistics(
             mean=self.middle,
-            mean_error=as_floats(np.abs(bent.mean(axis=0) - linear.mean(axis=0))),
-            deviation=as_floats(deviation),
-            deviation_error=as_floats(np.abs(bent.std(axis=0) - linear.std(axis=0))),
-            quantiles=as_floats(quantiles),
-            quantile_errors=as_floats(np.abs(np.quantile(bent, LEVELS, axis=0) - quantiles)),
-            lowest=as_floats(self.middle - reach),
-            highest=as_floats(self.middle + reach),
+            mean_error=np.abs(bent.mean(axis=0) - linear.mean(axis=0)),
+            deviation=deviation,
+            deviation_error=np.abs(bent.std(axis=0) - linear.std(axis=0)),
+            quantiles=quantiles,
+            quantile_errors=np.abs(np.quantile(bent, LEVELS, axis=0) - quantiles),
+            lowest=self.middle - reach,
+            highest=self.middle + reach,
         )

@@ -10,7 +10,7 @@ import numpy as np
 import tomli_w
 from pydantic import Field, model_validator
 
-from ..common.arrays import Array, as_floats
+from ..common.arrays import Array
 from ..common.errors import InputError, SolveError
 from ..common.files import write_atomically
 from ..common.toml_files import load_toml
@@ -51,7 +51,7 @@ class Covariance(Record):
         values, vectors = np.linalg.eigh(np.array(self.correlation))
         if values[0] < -1e-9 * len(values):
             raise InputError("correlation: expected one without negative eigenvalues", "others")
-        return as_floats((vectors * np.sqrt(values.clip(min=0.0))).T * np.array(self.deviation))
+        return (vectors * np.sqrt(values.clip(min=0.0))).T * np.array(self.deviation)
 
 
 def write_covariance(fit: Parameters, path: Path) -> None:

@@ -16,7 +16,7 @@ from rich.console import Console
 
 from ..actuation.control.linear import LinearModels
 from ..actuation.control.linear_model import locked_frequencies, robot_modes
-from ..common.arrays import Array, as_floats
+from ..common.arrays import Array
 from ..common.errors import FfrobotError, InputError, quoted
 from ..common.files import AnyPath, check_new_file, write_atomically
 from ..common.toml_files import load_toml, read_text
@@ -138,7 +138,7 @@ class RobotTarget:
         details = solution.outcomes["fit"].details
         assert isinstance(details, LinearModels)
         free = robot_modes(model := details.models[0]).frequency
-        frequency = locked_frequencies(model) if self._motors == "locked" else as_floats(free[free > 0.0])
+        frequency = locked_frequencies(model) if self._motors == "locked" else free[free > 0.0]
         return ("",) * len(frequency), frequency
 
     def files(self, changes: dict[Key, float], output: Path | None) -> dict[Path, str]:
@@ -214,7 +214,7 @@ def fit_measured(
                 raise InputError(
                     f"{table}: line {row.line}: expected modes that the model has ({len(family)} of them)", row.label
                 )
-        return as_floats(frequency[[places[row] for row in rows]])
+        return frequency[[places[row] for row in rows]]
 
     varied.check_new(replace=force)  # before any work is done
     measured_at = np.array([row.frequency for row in rows], dtype=np.float64)

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from ..common.arrays import Array, ComplexArray, as_floats
+from ..common.arrays import Array, ComplexArray
 from ..common.errors import InputError, SolveError
 from ..common.files import AnyPath, check_new_file, write_atomically
 from ..common.libraries import scipy
@@ -221,7 +221,7 @@ class PoseComparison:
         """Frequency response assurance criteria (p,), 1 of equal shapes (Heylen and Avitabile, IMAC 1998)."""
         a, b = self.pose.receptance, self.after
         across = np.abs((a.conj() * b).sum(axis=0)) ** 2
-        return as_floats(across / ((np.abs(a) ** 2).sum(axis=0) * (np.abs(b) ** 2).sum(axis=0)))
+        return across / ((np.abs(a) ** 2).sum(axis=0) * (np.abs(b) ** 2).sum(axis=0))
 
     @property
     def frequency_error(self) -> Array:
@@ -230,7 +230,7 @@ class PoseComparison:
         measured, fitted = (_peaks(self.pose.frequency, *pair) for pair in pairs)
         if not len(fitted):
             return np.zeros(0)
-        return as_floats(np.array([fitted[np.abs(fitted / f - 1.0).argmin()] / f - 1.0 for f in measured]))
+        return np.array([fitted[np.abs(fitted / f - 1.0).argmin()] / f - 1.0 for f in measured])
 
     @property
     def misfit(self) -> float:
@@ -244,7 +244,7 @@ def _peaks(frequency: Array, H: ComplexArray, prominence: float) -> Array:
     at = scipy.signal.find_peaks(size, prominence=prominence)[0]
     left, middle, right = size[at - 1], size[at], size[at + 1]
     shift = 0.5 * (left - right) / (left - 2.0 * middle + right)
-    return as_floats(frequency[at] + shift * 0.5 * (frequency[at + 1] - frequency[at - 1]))
+    return frequency[at] + shift * 0.5 * (frequency[at + 1] - frequency[at - 1])
 
 
 @dataclass(frozen=True)
@@ -293,7 +293,7 @@ class _Residuals:
             places = np.log(pose.frequency)
             apart = (np.arange(places[0], places[-1] + width / 4, width / 4)[:, None] - places) / width
             weights = np.exp(-0.5 * apart**2)
-            smoothing.append(as_floats(weights / weights.sum(axis=1, keepdims=True)))
+            smoothing.append(weights / weights.sum(axis=1, keepdims=True))
         known: dict[bytes, tuple[Array, Array]] = {}
 
         def at(x: Array) -> tuple[Array, Array]:
@@ -313,7 +313,7 @@ class _Residuals:
             ftol=1e-3 if width else 1e-14,
             gtol=None,
         )
-        return as_floats(found.x)
+        return found.x
 
 
 def differentiated(equations: Equations, values: Array, place: Sequence[Array]) -> list[list[Array]]:
@@ -359,14 +359,14 @@ def fit_receptances(
         return [found[k] for k in used]
 
     before = _receptances(equations(start), poses)
-    theta, place, converged = as_floats(start), of_used(start), False
+    theta, place, converged = start, of_used(start), False
     slopes = differentiated(of_used, theta, place)
     J = _Residuals(fitted, theta, place, slopes).at(np.zeros(len(start)))[1]
     check_distinguishable(J, keys, "FRFs", least=NO_EFFECT)
     for width in (*SMOOTH, *[0.0] * MOST_PLACES):
         about = _Residuals(fitted, theta, place, slopes)
         x = about.least(width)
-        theta, place = as_floats(theta * np.exp(x)), of_used(theta * np.exp(x))
+        theta, place = theta * np.exp(x), of_used(theta * np.exp(x))
         parts = [
             (one, other) for pair in zip(place, about.equations(x), strict=True)
             for one, other in zip(*map(unstacked, pair), strict=True)
@@ -382,7 +382,7 @@ def fit_receptances(
     deviation, correlation = uncertainty_of(J, r, known=all(pose.is_known for pose in fitted))
     return ResponseFit(
         keys=tuple(keys),
-        start=as_floats(start),
+        start=start,
         value=theta,
         relative_deviation=deviation,
         correlation=correlation,

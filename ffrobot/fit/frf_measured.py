@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from ..common.arrays import Array, Booleans, ComplexArray, as_floats
+from ..common.arrays import Array, Booleans, ComplexArray
 from ..common.errors import InputError, check_known, either, quoted
 from ..common.libraries import extras, scipy
 from ..common.rotations import of_rpy
@@ -81,7 +81,9 @@ def _universal(path: Path) -> Iterator[Column]:
         label = str(one["ordinate_axis_units_lab"]).strip().lower()
         is_si = label in ("", "none", *LABELS[ORDERS[kind]])
         values = one["data"].astype(complex)
-        yield Column(force, response, as_floats(one["x"]), values, coherence.get(at), order=ORDERS[kind], is_si=is_si)
+        yield Column(
+            force, response, np.asarray(one["x"], float), values, coherence.get(at), order=ORDERS[kind], is_si=is_si
+        )
 
 
 def _axis(path: Path, code: float) -> str:
@@ -113,8 +115,8 @@ def _of_csv(path: Path) -> Iterator[Column]:
         functions.setdefault(tuple(cells[end] for end in ENDS), []).append(numbers)
     for (force, response), rows in functions.items():
         values = np.array(rows)
-        coherence = as_floats(values[:, 3]) if values.shape[1] > 3 else None
-        yield Column(force, response, as_floats(values[:, 0]), values[:, 1] + 1j * values[:, 2], coherence)
+        coherence = values[:, 3] if values.shape[1] > 3 else None
+        yield Column(force, response, values[:, 0], values[:, 1] + 1j * values[:, 2], coherence)
 
 
 def _of_mat(path: Path) -> Iterator[Column]:
@@ -143,7 +145,7 @@ def _of_mat(path: Path) -> Iterator[Column]:
             f"H of shape {H.shape} for {shape[0]} frequencies, {shape[1]} forces and {len(ends[1])} responses",
         )
     for k, (force, response) in enumerate(zip(*ends, strict=True)):
-        yield Column(force, response, as_floats(frequency), H[:, k], coherence[:, k] if "coherence" in data else None)
+        yield Column(force, response, frequency, H[:, k], coherence[:, k] if "coherence" in data else None)
 
 
 G = 9.80665  # m/s²
@@ -240,7 +242,7 @@ class MeasuredPose:
     @cached_property
     def omega(self) -> Array:
         """Angular frequencies (F,), rad/s."""
-        return as_floats(2 * np.pi * self.frequency)
+        return 2 * np.pi * self.frequency
 
     @cached_property
     def ends(self) -> Ends:
@@ -269,7 +271,7 @@ class MeasuredPose:
         coherence = np.column_stack([one.coherence for one in self.responses])
         averages = self.test.averages or 2
         spread = np.sqrt((1.0 - coherence) / (2.0 * averages * np.maximum(coherence, FLOOR)))
-        return as_floats(np.where(np.isnan(spread), 1.0, np.maximum(spread, FLOOR)))
+        return np.where(np.isnan(spread), 1.0, np.maximum(spread, FLOOR))
 
 
 def read_tests(path: Path) -> list[MeasuredPose]:
@@ -296,7 +298,7 @@ def _read(path: Path, test: ResponseTest) -> MeasuredPose:
     responses = tuple(_response(test, column, inside) for column in columns)
     if test.averages is not None and any(np.isnan(one.coherence).any() for one in responses):
         raise InputError(f'{path}: test "{test.name}": averages: expected them with a coherence in the file', "none")
-    return MeasuredPose(test, as_floats(frequency[inside]), responses)
+    return MeasuredPose(test, frequency[inside], responses)
 
 
 def _check(where: str, column: Column, inside: Booleans) -> None:
@@ -331,7 +333,7 @@ def _response(test: ResponseTest, column: Column, inside: Booleans) -> MeasuredR
     force, response = (_direction(where, text, test.points, axes) for text in (column.force, column.response))
     receptance = column.values[inside] * factor / (2j * np.pi * column.frequency[inside]) ** order
     coherence = np.full(len(receptance), np.nan) if column.coherence is None else column.coherence[inside]
-    return MeasuredResponse(force, response, receptance, as_floats(coherence))
+    return MeasuredResponse(force, response, receptance, coherence)
 
 
 def _direction(where: str, text: str, points: Mapping[str, str], axes: Array) -> Direction:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..common.arrays import Array, as_floats
+from ..common.arrays import Array
 from ..common.errors import InputError, SolveError
 from ..common.libraries import scipy
 
@@ -121,7 +121,7 @@ def fit_frequencies(
     weight = 1.0 if uncertainty is None else measured / uncertainty
 
     def residuals(x: Array) -> Array:
-        return as_floats((frequencies(start * np.exp(x)) / measured - 1.0) * weight)
+        return (frequencies(start * np.exp(x)) / measured - 1.0) * weight
 
     def jacobian(x: Array) -> Array:
         steps = STEP * np.eye(len(keys))
@@ -140,14 +140,14 @@ def fit_frequencies(
     before, after = (measured * (1.0 + residuals(x) / weight) for x in (origin, optimum.x))
     return Fit(
         keys=tuple(keys),
-        start=as_floats(start),
-        value=as_floats(start * np.exp(optimum.x)),
+        start=start,
+        value=start * np.exp(optimum.x),
         relative_deviation=deviation,
         correlation=correlation,
         labels=tuple(labels),
-        measured=as_floats(measured),
-        before=as_floats(before),
-        after=as_floats(after),
+        measured=measured,
+        before=before,
+        after=after,
         uncertainty=uncertainty,
     )
 
@@ -188,4 +188,4 @@ def uncertainty_of(J: Array, r: Array, *, known: bool) -> tuple[Array, Array]:
     variance = 1.0 if known else float(r @ r) / (m - n)
     inverse = np.linalg.inv(J.T @ J)
     deviation = np.sqrt(np.diag(inverse))
-    return as_floats(np.sqrt(variance) * deviation), as_floats(inverse / np.outer(deviation, deviation))
+    return np.sqrt(variance) * deviation, inverse / np.outer(deviation, deviation)

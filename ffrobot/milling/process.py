@@ -16,7 +16,7 @@ from typing import Annotated, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
-from ..common.arrays import Array, ComplexArray, as_floats
+from ..common.arrays import Array, ComplexArray
 from ..common.errors import InputError
 from ..common.libraries import scipy
 from ..common.toml_files import load_toml
@@ -82,7 +82,7 @@ class Milling(Record):
         c, s, t, r = np.cos(2 * angle), np.sin(2 * angle), self.tangential, self.radial
         less, more = angle - s / 2, angle + s / 2  # of 1 − cos 2φ and 1 + cos 2φ
         rows = [[t * c / 2 - r * less, r * c / 2 - t * more], [t * less + r * c / 2, -t * c / 2 - r * more]]
-        return as_floats(0.5 * np.moveaxis(np.array(rows), (0, 1), (-2, -1)))
+        return 0.5 * np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
     @property
     def average(self) -> Array:
@@ -102,7 +102,7 @@ class Milling(Record):
         x /= size
         angles = np.arange(FEEDS) * np.pi / FEEDS if self.feed is None else np.zeros(1)
         y, c, s = np.cross(axis, x), np.cos(angles)[:, None], np.sin(angles)[:, None]
-        return as_floats(np.stack([c * x + s * y, c * y - s * x], axis=1))
+        return np.stack([c * x + s * y, c * y - s * x], axis=1)
 
 
 def read_milling(path: Path) -> Milling:
@@ -136,7 +136,7 @@ def _lobes(milling: Milling, limits: Sequence[StabilityLimits], worst: Tip, leas
     """Stable depths (S,), m, at the speeds, by the `limits` of all feeds, or of the tip in the `worst` one."""
     speed = np.array(milling.speeds) * 2 * np.pi / 60
     if milling.method == "averaged" or not np.isfinite(least):
-        return as_floats(np.min([one.lobes(milling.teeth, speed) for one in limits], axis=0))
+        return np.min([one.lobes(milling.teeth, speed) for one in limits], axis=0)
     bounds = least / 10, least * 1000  # the depth without lobes
     return np.array([limit_depth(worst, milling, float(each), bounds) for each in speed])
 
@@ -172,7 +172,7 @@ class Tip(NamedTuple):
         omega = np.concatenate([size - off, size + off]).ravel()
         omega = np.unique(omega[omega > 0.0])
         residues = right.T[:, :, None] * left[:, None, :]
-        return as_floats(omega), np.tensordot(1.0 / (1j * omega[:, None] - poles), residues, axes=1)
+        return omega, np.tensordot(1.0 / (1j * omega[:, None] - poles), residues, axes=1)
 
 
 class StabilityLimits(NamedTuple):
@@ -213,7 +213,7 @@ def stability_limits(C: Array, omega: Array, G: ComplexArray) -> StabilityLimits
     with np.errstate(divide="ignore", invalid="ignore"):
         depth = np.where(nu.real > 0.0, 0.5 / nu.real, np.inf)
         delayed = 1.0 - 1.0 / (depth * nu)  # exp(−iωτ)
-    return StabilityLimits(omega, as_floats(depth), as_floats(-np.angle(delayed) % (2 * np.pi)))
+    return StabilityLimits(omega, depth, -np.angle(delayed) % (2 * np.pi))
 
 
 def _eigenvalues(A: ComplexArray) -> ComplexArray:

@@ -12,7 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..common.arrays import Array, as_floats
+from ..common.arrays import Array
 from ..common.libraries import scipy
 from ..common.structs import struct
 from ..mbs.fields.paths import Kind, Piecewise, impulses, polynomial_law
@@ -121,7 +121,7 @@ class _Search:
         least, _ = self._first(averaged, self._left_inverted)
         for span, values in [motion for motion in averaged if motion[0] >= least][:TRIALS]:
             name, smooth = f"inverted, averaged over {1e3 * span:.3g} ms", np.vstack([values, values[-1:]])
-            times = as_floats(self.step * np.arange(len(smooth)))
+            times = self.step * np.arange(len(smooth))
             blend = polynomial_law(SMOOTHNESS).sample(times / times[-1])
             links = smooth + (1 - blend) * self.sag[0] + blend * self.sag[1]
             command, moments = self.robot.inverted(times, interpolated(times, links))

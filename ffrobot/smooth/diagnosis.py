@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ..common.arrays import Array, as_floats
+from ..common.arrays import Array
 from ..common.structs import struct
 from ..mbs.fields.paths import Piecewise
 from .recording import Fault, Limits, Recording, evened, faults_of_motion, faults_of_stamps, peaks
@@ -111,10 +111,10 @@ def diagnose(robot: Robot, recording: Recording, limits: Limits) -> Diagnosis:
         even=ride if even is recording else robot.ride(*even.dense(min(even.step / 4, 1e-3))),
         faults=tuple(faults),
         modes=modes,
-        frequencies=as_floats(frequencies),
-        alone=as_floats(2 * np.abs(left).sum(axis=0)),
-        shares=as_floats(in_phase / (in_phase.sum() or 1.0)),
-        by_mode=as_floats(2 * np.abs(whole)[:kept]),
+        frequencies=frequencies,
+        alone=2 * np.abs(left).sum(axis=0),
+        shares=in_phase / (in_phase.sum() or 1.0),
+        by_mode=2 * np.abs(whole)[:kept],
         spectrum=np.vstack([grid, spectrum.T]),
         peaks=peaks(*recording.dense(recording.step / 4)),
     )
@@ -129,7 +129,7 @@ def _spectrum(path: Piecewise, frequencies: Array) -> Array:
     """(F, n) |∫ θ̈ e^(−iωt) dt| of motors, rad/s."""
     fine, of_motors = accelerations(path)
     kernel = np.exp(-2j * np.pi * np.outer(frequencies, fine))
-    return as_floats(np.abs(kernel @ of_motors) * (fine[1] - fine[0]))
+    return np.abs(kernel @ of_motors) * (fine[1] - fine[0])
 
 
 def _resonance(robot: Robot, frequencies: Array, grid: Array, spectrum: Array) -> Iterator[Fault]:

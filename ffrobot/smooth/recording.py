@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..common.arrays import Array, Booleans, as_floats
+from ..common.arrays import Array, Booleans
 from ..common.errors import InputError, did_you_mean, quoted
 from ..common.libraries import scipy
 from ..common.structs import struct
@@ -61,7 +61,7 @@ class Recording:
         parts = [np.linspace(a, b, int(np.ceil((b - a) / step)) + 1)[1:]
                  for a, b in zip(self.times[:-1], self.times[1:], strict=True)]  # fmt: skip
         times = np.concatenate([self.times[:1], *parts])
-        return times, as_floats(scipy.interpolate.CubicHermiteSpline(self.times, self.values, self.rates)(times))
+        return times, scipy.interpolate.CubicHermiteSpline(self.times, self.values, self.rates)(times)
 
 
 def read_recording(path: Path, scene: Scene, *, is_in_degrees: bool = False) -> Recording:

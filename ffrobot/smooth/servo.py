@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..common.arrays import Array, ComplexArray, as_floats
+from ..common.arrays import Array, ComplexArray
 from ..common.errors import InputError
 from ..common.libraries import scipy
 from ..common.structs import struct
@@ -215,7 +215,7 @@ class Servo:
         for k, axis in enumerate(self.axes):
             F[1:, k] = (np.exp(-longest * s) / (axis.at(s) * np.sinc(frequency[1:] * step) ** 2) - 1) / s
             F[0, k] = axis.delay - longest + axis.denominator[-2] - np.append(0.0, axis.numerator)[-2]
-        return as_floats(position + np.fft.irfft(F * np.fft.rfft(rate, axis=0), count, axis=0))
+        return position + np.fft.irfft(F * np.fft.rfft(rate, axis=0), count, axis=0)
 
 
 def _decay(poles: ComplexArray) -> float:
