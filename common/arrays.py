@@ -1,6 +1,6 @@
 """Names for the types of arrays, in annotations (shapes and units stand in docstrings); null spaces."""
 
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -22,12 +22,12 @@ def as_floats(values: NDArray[np.floating[Any]]) -> Array:
 
 def as_list(values: Array) -> list[float]:
     """Convert a vector (n,) to Python floats."""
-    return cast(list[float], values.tolist())
+    return values.tolist()
 
 
 def as_rows(values: NDArray[Any]) -> list[list[Any]]:
     """Convert a matrix (m, n) to rows of Python numbers."""
-    return cast(list[list[Any]], values.tolist())
+    return values.tolist()
 
 
 def null_space(J: Array, tolerance: float) -> Array:

@@ -62,8 +62,7 @@ def in_memory() -> Iterator[h5py.File]:
 def image_of(file: h5py.File) -> bytes:
     """The content of such a file."""
     file.flush()
-    image: bytes = file.id.get_file_image()
-    return image
+    return file.id.get_file_image()
 
 
 def read(dataset: h5py.Dataset) -> Any:

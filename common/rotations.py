@@ -142,7 +142,7 @@ def rpy_of(C: Array) -> list[float]:
 
 def unit(vector: Array) -> Array:
     """A vector (3,) of length 1 along one of any length that is not 0, also where squares of that are no numbers."""
-    scaled: Array = vector / np.abs(vector).max()
+    scaled = vector / np.abs(vector).max()
     return scaled / np.linalg.norm(scaled)
 
 

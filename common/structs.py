@@ -31,8 +31,7 @@ def kept(function: Callable[[T], R]) -> Callable[[T], R]:
     def once(of: T) -> R:
         known = vars(of)
         if name in known:
-            result: R = known[name]
-            return result
+            return known[name]
         result = function(of)
         if result is not of:  # which would not be deleted until cycles are searched for
             known[name] = result

@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import ValidationInfo
 
-from ...common.arrays import Array, Booleans, as_floats
+from ...common.arrays import Array, Booleans
 from ...common.deferred import ReadBy
 from ...common.errors import InputError
 from ...common.tables import shown
@@ -120,7 +120,7 @@ def check_derivatives(function: TimeFunction, end: float, describe: str) -> None
 def _differences(function: TimeFunction, times: Array, h: float) -> Array:
     """(2, T) derivatives of value and rate at `times` (T,) by central differences of fourth order with the step h."""
     before2, before, after, after2 = (function.sample(times + k * h)[:2] for k in (-2, -1, 1, 2))
-    return as_floats((before2 - 8 * before + 8 * after - after2) / (12 * h))
+    return (before2 - 8 * before + 8 * after - after2) / (12 * h)
 
 
 def _judged(once: Array, twice: Array, given: Array, round_off: float) -> tuple[Booleans, Booleans]:

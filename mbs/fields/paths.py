@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array
 from ...common.structs import struct
 from .._core import TimeFunction
 
@@ -45,21 +45,21 @@ class Piecewise:
     def moved(self, factor: float = 1.0, delay: float = 0.0) -> Piecewise:
         """Return the motion stretched by `factor` about t = 0, then delayed by `delay` (s)."""
         powers = factor ** -np.arange(self.coefficients.shape[1] - 1, -1, -1.0)
-        return Piecewise(factor * self.breaks + delay, as_floats(self.coefficients * powers[None, :, None]))
+        return Piecewise(factor * self.breaks + delay, self.coefficients * powers[None, :, None])
 
     def along(self, change: Array) -> Piecewise:
         """Return the motion of one component times a vector `change` (n,)."""
-        return Piecewise(self.breaks, as_floats(self.coefficients * change))
+        return Piecewise(self.breaks, self.coefficients * change)
 
     @property
     def first(self) -> Array:
         """Initial value (n,), m or rad."""
-        return as_floats(self.coefficients[0, -1])
+        return self.coefficients[0, -1]
 
     @property
     def last(self) -> Array:
         """Final value (n,), m or rad."""
-        return as_floats(shifted(self.coefficients[-1], self.end - self.breaks[-2])[-1])
+        return shifted(self.coefficients[-1], self.end - self.breaks[-2])[-1]
 
     def sample(self, times: Array, derivative: int = 0) -> Array:
         """Return a derivative (T, n), m or rad per sᵏ, at `times` (T,), s; at jumps that of the following piece."""
@@ -69,7 +69,7 @@ class Piecewise:
         values = np.zeros((len(t), self.coefficients.shape[2]))
         for k, power in enumerate(powers):
             values = values * (t - self.breaks[piece])[:, None] + perm(power, derivative) * self.coefficients[piece, k]
-        return values if derivative == 0 else as_floats(np.where((t == times)[:, None], values, 0.0))
+        return values if derivative == 0 else np.where((t == times)[:, None], values, 0.0)
 
     def functions(self) -> list[TimeFunction]:
         """One function of time for each component, held before and after the motion."""
@@ -109,7 +109,7 @@ def superposed(motions: Sequence[Piecewise], weights: Sequence[float] | None = N
 def merged(instants: Array) -> Array:
     """Return the instants, s, in ascending order; those that differ by round-off are one."""
     every = np.unique(instants)
-    return as_floats(every[np.append(True, np.diff(every) > SAME_TIME * np.ptp(every))])
+    return every[np.append(True, np.diff(every) > SAME_TIME * np.ptp(every))]
 
 
 Profile = Literal["rest-to-rest", "s-curve", "trapezoid"]
@@ -139,7 +139,7 @@ def law_in(duration: float, profile: Profile, smoothness: int) -> Piecewise:
     if profile == "rest-to-rest":
         return polynomial_law(smoothness).moved(duration)
     times = HALF ** np.arange(smoothness + 1)
-    return averaged_step(as_floats(duration * times / times.sum()))
+    return averaged_step(duration * times / times.sum())
 
 
 def law_within(distance: float, limits: PathLimits, profile: Profile, smoothness: int) -> Piecewise:
@@ -185,19 +185,19 @@ def averaged_step(times: Array) -> Piecewise:
     The highest derivative is constant between the sums of some of the times; the others follow by integration.
     """
     n = len(times)
-    instants: Array = np.zeros(1)
-    signs: Array = np.ones(1)
+    instants = np.zeros(1)
+    signs = np.ones(1)
     for T in times:
         instants, signs = np.concatenate([instants, instants + T]), np.concatenate([signs, -signs])
     breaks = merged(instants)
     jumps = [signs[np.abs(instants - t) <= 2 * SAME_TIME * times.sum()].sum() for t in breaks]
     highest = np.cumsum(jumps) / np.prod(times)
     coefficients = np.zeros((len(breaks) - 1, n + 1, 1))
-    state: Array = np.zeros(n)
+    state = np.zeros(n)
     for k, step in enumerate(np.diff(breaks)):
         derivatives = np.append(state, highest[k])  # s, ṡ, …
         coefficients[k, :, 0] = [derivatives[m] / factorial(m) for m in range(n, -1, -1)]
-        state = as_floats(shifted(coefficients[k], step)[::-1, 0][:n] * [factorial(m) for m in range(n)])
+        state = shifted(coefficients[k], step)[::-1, 0][:n] * [factorial(m) for m in range(n)]
     return Piecewise(breaks, coefficients)
 
 
@@ -221,7 +221,7 @@ def law_peak(smoothness: int, order: int) -> float:
 def _polynomial(m: int) -> Array:
     """(2m + 2,) coefficients, highest power first."""
     bell = (-1.0) ** m * np.poly([0.0] * m + [1.0] * m)
-    return as_floats(np.asarray(np.polyint(bell)) * (factorial(2 * m + 1) / factorial(m) ** 2))
+    return np.polyint(bell) * (factorial(2 * m + 1) / factorial(m) ** 2)
 
 
 SAMPLES = 64  # of each polynomial, to find where a rounded path is fastest

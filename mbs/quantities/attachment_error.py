@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array
 from ...common.rotations import exponential, left_jacobian, logarithm
 from ...fe_models.modal_body import ModalBody
 from ..linear.vibration import elastic_shapes
@@ -86,8 +86,7 @@ def mode_error(links: Iterable[ModesInMotion]) -> float | None:
 def _late(body: Body) -> Array:
     """1/ω_m² − 1/ω² (n,), s², of `mode_error`, where that is above 0."""
     highest, lowest_after = np.sort(body.stiffness)[body.n_eigenmodes - 1 : body.n_eigenmodes + 1]
-    late: Array = np.maximum(1.0 / np.sqrt(highest * lowest_after) - 1.0 / body.stiffness, 0.0)
-    return late
+    return np.maximum(1.0 / np.sqrt(highest * lowest_after) - 1.0 / body.stiffness, 0.0)
 
 
 def start_jolt(start: Start) -> float:
@@ -141,7 +140,7 @@ def start_of_motion(run: Run) -> Start:
     """Return the initial state of a run for error estimates."""
     tree, n_v = run.model.tree, run.model.tree.n_v
     stiffness, late, damping = np.zeros(n_v), np.zeros(n_v), np.zeros((n_v, n_v))
-    energy: Array = np.zeros(len(run.time))
+    energy = np.zeros(len(run.time))
     for node in tree.nodes:
         stiffness[node.p_v], damping[node.p_v, node.p_v] = node.body.stiffness, node.body.damping
         energy += run.q[:, node.p_q] ** 2 @ node.body.stiffness
@@ -200,7 +199,7 @@ def ends_in_equations(body: Body, p: Array) -> RodEnds:
     """Return the ends of a piece as its equations contain them, at p (T, n), √kg·m."""
     root, tip = (bent_section(body, end, p) for end in ("root", "tip"))
     back = np.swapaxes(exponential(root.phi), -1, -2)
-    return RodEnds(as_floats(back @ exponential(tip.phi)), as_floats(np.einsum("tij,tj->ti", back, tip.u - root.u)))
+    return RodEnds(back @ exponential(tip.phi), np.einsum("tij,tj->ti", back, tip.u - root.u))
 
 
 def rod_ends(modal: ModalBody, p: Array) -> RodEnds:
@@ -218,4 +217,4 @@ def rod_ends(modal: ModalBody, p: Array) -> RodEnds:
         uneven = np.cross(mean - phi[k] - turn / 2, h * X)  # of curvature
         step = np.einsum("tij,tj->ti", left_jacobian(turn), h * X + strain) + uneven
         r, A = r + np.einsum("tij,tj->ti", A, step), A @ exponential(turn)
-    return RodEnds(as_floats(A), as_floats(r))
+    return RodEnds(A, r)

@@ -15,7 +15,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array
 from ...common.rotations import exponential, left_jacobian, logarithm, of_quaternion, quaternions
 from ...common.structs import kept, struct
 from ...fe_models.link_records.families import HOLDING_ROOT
@@ -103,8 +103,7 @@ def _named(datasets: dict[str, Array]) -> dict[str, Array]:
 def continuous(e: Array) -> Array:
     """Return quaternions e (T, 4) with signs that do not jump, the first e0 ≥ 0."""
     flips = np.sum(e[1:] * e[:-1], axis=1) < 0
-    signs: Array = np.where(np.cumsum(np.append(False, flips)) % 2, -1.0, 1.0)
-    return e * signs[:, None]
+    return e * np.where(np.cumsum(np.append(False, flips)) % 2, -1.0, 1.0)[:, None]
 
 
 def _motion_of_link(run: Run, link: LinkInPieces) -> BodyMotion:
@@ -157,22 +156,22 @@ def _along_chord(root: Motion, tip: Motion) -> tuple[Array, Array]:
     across = np.cross(root.F[:, :, 0], c)
     sine, cosine = np.linalg.norm(across, axis=1), np.sum(root.F[:, :, 0] * c, axis=1)
     turn = across * np.divide(np.arctan2(sine, cosine), sine, out=np.ones_like(sine), where=sine > 0.0)[:, None]
-    A = as_floats(exponential(turn) @ root.F)
+    A = exponential(turn) @ root.F
     J = left_jacobian(-_seen_from(A, turn))
     swing = np.cross(c, c_dot)
     left, of_x = (np.linalg.solve(J, b[:, :, None])[:, 0, 0] for b in (_seen_from(A, root.omega - swing), 0 * c + X))
-    return A, as_floats(swing + (left / of_x)[:, None] * c)
+    return A, swing + (left / of_x)[:, None] * c
 
 
 def _seen_from(A: Array, vectors: Array) -> Array:
-    return as_floats(np.einsum("tji,tj->ti", A, vectors))
+    return np.einsum("tji,tj->ti", A, vectors)
 
 
 def _nearest_shape(modal: ModalBody, u: Array) -> Array:
     """P (T, n) for which Φp comes nearest to displacements and twists at the length u (stations, 4, T), m."""
     stations = modal.stations
     rows = np.concatenate([stations.translation, modal.length * stations.rotation[:, :1]], axis=1)
-    return as_floats(np.linalg.lstsq(rows.reshape(-1, modal.mode_count), u.reshape(-1, u.shape[2]), rcond=None)[0].T)
+    return np.linalg.lstsq(rows.reshape(-1, modal.mode_count), u.reshape(-1, u.shape[2]), rcond=None)[0].T
 
 
 @kept
@@ -268,13 +267,13 @@ def modal_coordinates(run: Run, body: str) -> Array:
     if body in run.links:
         return _links(run)[body].modal
     node = node_of(run, body)
-    return as_floats(run.q[:, node.p_q] @ node.body.modal_transform.T)
+    return run.q[:, node.p_q] @ node.body.modal_transform.T
 
 
 def modal_rates(run: Run, body: str) -> Array:
     """Return rates (T, n), √kg·m/s, of the modes that a body, or the whole link, has in the equations."""
     if body in run.links:
-        return as_floats(_links(run)[body].modal_velocity @ run.links[body].to_own)
+        return _links(run)[body].modal_velocity @ run.links[body].to_own
     return run.v[:, node_of(run, body).p_v]
 
 
@@ -283,7 +282,7 @@ def plane_angle(run: Run, body: str) -> Array:
     e = body_motion(run, body).orientation
     angle = 2 * np.arctan2(e[:, 3], e[:, 0])
     counted = _turned(run, run.links[body].names[0] if body in run.links else body)
-    return as_floats(angle + 2 * np.pi * np.round((counted - angle) / (2 * np.pi)))
+    return angle + 2 * np.pi * np.round((counted - angle) / (2 * np.pi))
 
 
 def _turned(run: Run, body: str) -> Array:
@@ -307,7 +306,7 @@ def _bent(run: Run, section: Section) -> Array | float:
         return 0.0
     node = run.model.tree.nodes[section.body]
     phi = bent_section(node.body, section.point, run.q[:, node.p_q]).phi
-    return as_floats(section.turned(phi[..., None])[:, 2, 0])
+    return section.turned(phi[..., None])[:, 2, 0]
 
 
 def section_motion(run: Run, point: str) -> Motion:
@@ -330,10 +329,9 @@ def deflection(run: Run, point: str) -> Array:
     if name in run.links:
         frame, r = _links(run)[name], section_motion(run, point).r
         in_frame = np.einsum("tji,tj->ti", of_quaternion(frame.orientation), r - frame.position)
-        return as_floats(in_frame - run.links[name].points[label].position)
+        return in_frame - run.links[name].points[label].position
     node = node_of(run, name)
-    moved: Array = bent_section(node.body, label, run.q[:, node.p_q]).u
-    return moved - node.body.points[label].position
+    return bent_section(node.body, label, run.q[:, node.p_q]).u - node.body.points[label].position
 
 
 def joint_motion(run: Run, name: str) -> tuple[Array, Array] | None:

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array
 from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
 
@@ -62,13 +62,13 @@ class ModalLoads:
     def relative(self) -> Array:
         """Matrices (J, n, n) K_ff^-½ K K_ff^-½."""
         root = 1 / np.sqrt(self.stiffness)
-        return as_floats(self.K * root * root[:, None])
+        return self.K * root * root[:, None]
 
     @cached_property
     def squares(self) -> Array:
         """Squared Frobenius norms (T,) of K_ff^-½ S K_ff^-½."""
         flat = self.relative.reshape(len(self.K), -1)
-        return as_floats(np.maximum(((self.f @ (flat @ flat.T)) * self.f).sum(axis=1), 0.0))
+        return np.maximum(((self.f @ (flat @ flat.T)) * self.f).sum(axis=1), 0.0)
 
 
 def lasting(loads: ModalLoads, time: Array) -> ModalLoads:
@@ -109,7 +109,7 @@ def _eigenvalues(loads: ModalLoads) -> Iterator[tuple[float, Array]]:
     for start in range(0, len(order), AT_ONCE):
         some = order[start : start + AT_ONCE]
         S = np.tensordot(f[some], K, axes=1)
-        yield float(norms[start + len(some)]), as_floats(np.linalg.eigvalsh(S))
+        yield float(norms[start + len(some)]), np.linalg.eigvalsh(S)
 
 
 OUTPUTS = 64  # at which Δp is found: those with the largest ‖S‖ ‖p‖, and as many with the largest ‖p‖
@@ -173,15 +173,13 @@ def missing_to_first_order(
 
 def _moved(point: LoadedPoint, p: Array, change: Array) -> Array:
     """(6, T) ΦΔp − ½ pᵀK p of p and Δp (T, n)."""
-    moved: Array = point.by_modes @ change.T - 0.5 * ((p @ point.K) * p).sum(axis=2)
-    return moved
+    return point.by_modes @ change.T - 0.5 * ((p @ point.K) * p).sum(axis=2)
 
 
 def _carried(support: LoadedPoint, moved: Array, places: Array) -> Array:
     """What a section that is `moved` (6, m) does to points at `places` (k, 3) that it carries: (k, 3, m)."""
     arms = places - support.position
-    carried: Array = moved[:3] + np.cross(moved[3:].T, arms[:, None]).swapaxes(1, 2)
-    return carried
+    return moved[:3] + np.cross(moved[3:].T, arms[:, None]).swapaxes(1, 2)
 
 
 def missing_to_second_order(

@@ -163,7 +163,7 @@ def _settling(path: CubicHermiteSpline, place: Array, since: float, tolerance: f
     """Of a point on its `path` (m, by s), by the distance from its final `place` (d,)."""
 
     def off(t: Array | float) -> Array:
-        return np.asarray(np.linalg.norm(path(t) - place, axis=-1))
+        return np.linalg.norm(path(t) - place, axis=-1)
 
     end = float(path.x[-1])
     window = min(1.0 / lowest, end - since) if lowest > 0.0 else end - since

@@ -165,7 +165,7 @@ def body_stress(body: ModalBody, recovery: Recovery) -> BodyStress:
 
 def surface_stress(body: ModalBody, recovery: Recovery) -> Array:
     """Return stresses (T, p, 6), Pa, body axes, on the surface of a body whose file has surface stresses."""
-    return np.asarray(np.einsum("pin,tn->tpi", _surface_cases(body, recovery), recovery.cases, optimize=True))
+    return np.einsum("pin,tn->tpi", _surface_cases(body, recovery), recovery.cases, optimize=True)
 
 
 def _surface_cases(body: ModalBody, recovery: Recovery) -> Array:
@@ -192,7 +192,7 @@ def _cases(body: ModalBody, recovery: Recovery, x: Array, modal: Array, static: 
 
 def von_mises(stress: Array) -> Array:
     """Return von Mises stress (…,), Pa, of stresses (…, 6), Pa: xx, yy, zz, yz, xz, xy."""
-    return np.asarray(np.linalg.norm(stress @ _distortion().T, axis=-1))
+    return np.linalg.norm(stress @ _distortion().T, axis=-1)
 
 
 def _distortion() -> Array:

@@ -257,7 +257,7 @@ def _violated(run: Run, allowed: float) -> Iterator[str]:
 
 def _extent(run: Run) -> float:
     """A length (m) of the robot: its largest body, or the space in which its bodies move."""
-    origins: Array = np.concatenate([places(run).frame(number).r for number in range(len(run.model.tree.nodes))])
+    origins = np.concatenate([places(run).frame(number).r for number in range(len(run.model.tree.nodes))])
     bodies = [
         np.ptp([at.position for at in node.body.points.values()], axis=0)
         for node in run.model.tree.nodes

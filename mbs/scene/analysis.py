@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, get_args
 import numpy as np
 from pydantic import Field, model_validator
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array
 from ...common.errors import did_you_mean, either, quoted
 from ...common.keys import MOST_OUTPUTS, MOST_STEPS
 from ...common.validation import Record
@@ -279,7 +279,7 @@ def output_times(end: float, step: float, before: float = 0.0, after: float = 0.
     if not (end and step):
         return np.zeros(1)
     early, late, count = (round(x / step) for x in (before, after, end))
-    times = as_floats(np.arange(-early, count + late + 1) * step)
+    times = np.arange(-early, count + late + 1) * step
     times[early + count] = end
     return times
 

@@ -36,7 +36,7 @@ GONE = 1e-12  # of the largest twist: decaying parts below it are none
 MANY = np.arange(40) / 40  # of an interval, where a polynomial is looked at for its largest value
 DEGREES = np.arange(len(TEN.c))
 # Coefficients of Legendre's polynomials of 2ξ − 1 by values at the points, and powers of ξ, lowest first, by these
-TO_SERIES: Array = np.linalg.inv(
+TO_SERIES = np.linalg.inv(
     np.polynomial.legendre.legvander(2 * TEN.c - 1, 9)  # type: ignore[no-untyped-call, unused-ignore]
 )
 POWERS = np.array([[(-1.0) ** (k + i) * comb(k, i) * comb(k + i, i) for k in range(10)] for i in range(10)])
@@ -206,7 +206,7 @@ def _nodes(breaks: Array) -> Array:
 def _through(breaks: Array, values: Array) -> PPoly:
     """Polynomials through values (N · 10, k) at `_nodes`, without what is rounding: their derivatives are used."""
     h, at_nodes = np.diff(breaks), values.reshape(len(breaks) - 1, len(TEN.c), -1)
-    series: Array = np.einsum("ij,Njk->Nik", TO_SERIES, at_nodes)
+    series = np.einsum("ij,Njk->Nik", TO_SERIES, at_nodes)
     series = np.where(np.abs(series) > ROUNDING * np.abs(values).max(axis=0, initial=1e-300), series, 0.0)
     powers = np.einsum("ij,Njk->iNk", POWERS, series) / h[None, :, None] ** DEGREES[:, None, None]
     return scipy.interpolate.PPoly(powers[::-1], breaks)

@@ -141,7 +141,7 @@ def _check_rotors(servo: GearedServo, ratios: Array) -> None:
     the body that carries the rotor does not turn along with it.
     """
     model, gears = servo.model, servo.gears
-    times: Array = servo.end * np.linspace(0.0, 1.0, SAMPLES + 2)[1:-1]
+    times = servo.end * np.linspace(0.0, 1.0, SAMPLES + 2)[1:-1]
     still = np.zeros((SAMPLES, len(servo.scale)))
     states = servo.motion.motion(as_list(times), still, still, still, servo.postures(times))
     spin_up = rotor_torques(model, states, times)

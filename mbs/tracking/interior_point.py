@@ -108,8 +108,7 @@ class _Equations:
 
     def solve(self, right: Array) -> Array:
         """The unknowns."""
-        solution: Array = scipy.linalg.lapack.dgbtrs(self.factors, self.band, self.band, right, self.pivots)[0]
-        return solution
+        return scipy.linalg.lapack.dgbtrs(self.factors, self.band, self.band, right, self.pivots)[0]
 
     def _add_costs(self, ab: Array, blocks: Array) -> None:
         parts = (self.x[0, 0], slice(None, self.s)), (self.x[1, 0], slice(self.s, None))

@@ -20,7 +20,7 @@ TOLERANCE = 1e-8  # of the last Newton step, relative to the peak of its quantit
 POWERS = np.arange(2, len(GAUSS.c))
 CURVATURE = (GAUSS.c[:, None] ** (POWERS - 2) * POWERS * (POWERS - 1)) @ GAUSS.to_powers[2:]
 # Bernstein's coefficients (5, 4) on [0, 1] of a polynomial's integral, by its values at the Gauss points
-BERNSTEIN: Array = np.einsum(
+BERNSTEIN = np.einsum(
     "ik,kj->ij", [[comb(i, k) / (k * comb(4, k)) for k in range(1, 5)] for i in range(5)], GAUSS.to_powers
 )
 FIFTHS, THIRDS = np.linspace(0.0, 1.0, 5), np.linspace(0.0, 1.0, 4)

@@ -6,7 +6,7 @@ what would do beyond limits, is in `advice`; a simulation under torques alone sh
 """
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import KW_ONLY, replace
 from typing import Annotated, Literal, Self
 
@@ -360,5 +360,5 @@ def _outcome(analysis: Tracking, servo: Servo, tracked: Tracked, context: Contex
 
 def _by_body(context: Context, V: Array) -> Mapping[str, Array]:
     counts = [len(of_link.edges) for of_link in context.patches.values()]
-    parts: Sequence[Array] = np.split(V, np.cumsum(counts)[:-1], axis=-1)
+    parts = np.split(V, np.cumsum(counts)[:-1], axis=-1)
     return dict(zip(context.patches, parts, strict=True))
