@@ -11,7 +11,7 @@ import numpy as np
 
 from ..common.arrays import Array
 from ..common.peaks import largest, root_mean_square
-from ..mbs.quantities.motion import point_motion
+from ..mbs.quantities.motion import section_motion
 from ..run.result import AnalysisResult, Solution
 from .actuators import read_motors, read_unsupplied
 from .joints import Coordinates, Scene, labelled_coordinates
@@ -36,7 +36,7 @@ def write_off_path(group: h5py.Group, solution: Solution, result: AnalysisResult
     inside = np.clip(run.time[both], 0.0, last)
     for trajectory in run.model.scene.trajectory:
         if f"trajectories/{trajectory.name}/target" in of and trajectory.point is not None and trajectory.components:
-            position = point_motion(run, trajectory.point).position[both]
+            position = section_motion(run, trajectory.point).r[both]
             off = [position[:, "xyz".index(axis)] - f.sample(inside)[0] for axis, f in trajectory.components.items()]
             distance = np.linalg.norm(off, axis=0)
             entry = group.create_group(f"off_path/{trajectory.name}")

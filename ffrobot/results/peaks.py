@@ -12,7 +12,7 @@ from ..common.arrays import Array, Indices, as_floats
 from ..common.meanings import matches, meaning
 from ..common.peaks import largest, shares
 from ..mbs.quantities.motion import deflection, joint_motion, reported_points
-from ..mbs.quantities.supply import followed_trajectories, gear_moment, motor_moments, motor_motion, path_force
+from ..mbs.quantities.supply import followed_trajectories, motor_moments, motor_motion, path_force
 
 if TYPE_CHECKING:  # reading can do without the core
     from ..mbs.joints.joint import JointRecord
@@ -74,8 +74,7 @@ def _of_joint(result: AnalysisResult, joint: JointRecord, place: str) -> Iterato
             yield "motor_moment", moment / (joint.given_gear_ratio or 1.0)
     if motor is not None:
         yield "motor_rate", motor[1]
-    if (moment := gear_moment(run, joint.name)) is not None:
-        yield "gear_moment", moment
+        yield "gear_moment", motor[2]
 
 
 def peak_of(dataset: h5py.Dataset, time: Array, column: int | None = None) -> tuple[float, float]:

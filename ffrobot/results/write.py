@@ -6,7 +6,6 @@ import json
 import os
 import tomllib
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -19,6 +18,7 @@ from ..common.files import write_atomically
 from ..common.hdf5 import image_of, in_memory
 from ..common.meanings import write_record
 from ..common.python_files import allowed_python, imported_files
+from ..common.rotations import quaternions
 from ..common.version import VERSION
 from ..mbs import _core
 from ..mbs.fields.field_types import DATASET, METHOD
@@ -27,11 +27,12 @@ from ..mbs.posture.redundancy import resolving_joints
 from ..mbs.quantities.motion import (
     body_motion,
     constraint_violation,
+    continuous,
     joint_motion,
     plane_angle,
-    point_motion,
     point_names,
     reported_points,
+    section_motion,
 )
 from ..mbs.quantities.stress import BodyStress
 from ..mbs.quantities.supply import actuator_forces, followed_trajectories, gear_motions, motor_motion
@@ -199,14 +200,17 @@ def _write_bodies(group: h5py.Group, solution: Solution, result: AnalysisResult)
     for name in reported_points(run):
         body, moved = solution.bodies[name].spatial, body_motion(run, name)
         F_p, T = None if forces is None else forces.modal[name][histories.outputs], body.modal_transform
+        modes = {"modal": moved.modal, "modal_velocity": moved.modal_velocity}
         about = "modes of the modal body file"
         if run.space.is_plane and T.shape[1] < T.shape[0]:  # of those that move in the plane
             group[f"bodies/{name}/modal_transform"] = T
             about = "modes of the modal body file are modal_transform times these"
-            p, p_dot = (np.linalg.lstsq(T, values.T, rcond=None)[0].T for values in (moved.modal, moved.modal_velocity))
-            F_p, moved = None if F_p is None else F_p @ T, replace(moved, modal=p, modal_velocity=p_dot)
-        angle = plane_angle(run, name) if run.space.is_plane else moved.orientation
-        for key, values in moved.within(run.space, angle).datasets.items():
+            modes = {key: np.linalg.lstsq(T, values.T, rcond=None)[0].T for key, values in modes.items()}
+            F_p = None if F_p is None else F_p @ T
+        turned = {"angle": plane_angle(run, name)} if run.space.is_plane else {"quaternion": moved.orientation}
+        of_frame = {"position": run.space.along(moved.position), "velocity": run.space.along(moved.velocity)}
+        of_frame["angular_velocity"] = run.space.about(moved.angular_velocity)
+        for key, values in (of_frame | turned | modes).items():
             group[f"bodies/{name}/{key}"] = values
         if F_p is not None:
             group[f"bodies/{name}/modal_force"] = F_p
@@ -227,9 +231,10 @@ def _write_points(group: h5py.Group, result: AnalysisResult) -> None:
     run = result.run
     for place in point_names(run):
         if result.wants(f"points/{place}"):
-            for key, values in point_motion(run, place).within(run.space).datasets.items():
-                if key != "deflection":  # which has peaks
-                    group[f"points/{place}/{key}"] = values
+            at = section_motion(run, place)
+            group[f"points/{place}/position"] = run.space.along(at.r)
+            if not run.space.is_plane:
+                group[f"points/{place}/quaternion"] = continuous(quaternions(at.F))
         if result.wants(f"points/{place}/predicted_shift") and place in result.predicted_shift:
             group[f"points/{place}/predicted_shift"] = run.space.along(result.predicted_shift[place])
 

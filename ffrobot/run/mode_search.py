@@ -12,7 +12,7 @@ import numpy as np
 from ..common.arrays import Array, as_floats
 from ..mbs.model.body import Body
 from ..mbs.model.truncation import loaded_points, with_fewer_modes
-from ..mbs.quantities.motion import point_motion
+from ..mbs.quantities.motion import deflection
 from ..mbs.quantities.supply import followed_trajectories, motor_moments, path_force
 from ..scene.scene import Scene
 from .bodies import LoadedBody
@@ -46,7 +46,7 @@ def reported_modes(result: AnalysisResult) -> Reported:
     points = [f"{node.body.name}.{label}" for node in nodes for label in node.body.points]
     voltages = {} if result.actuation is None else result.actuation.voltages
     found_by_kind = {
-        "deflections": {point: point_motion(run, point).deflection for point in points},
+        "deflections": {point: deflection(run, point) for point in points},
         "forces": {name: values for name, values in forces.items() if values.size},
         "motors": motor_moments(run),
         "voltages": {name: of.required for name, of in voltages.items()},

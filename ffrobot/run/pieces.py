@@ -10,8 +10,8 @@ from ..common.arrays import as_floats
 from ..common.errors import InputError
 from ..mbs.model.divided_link import DividedLink, LinkInPieces, PieceOfLink, divided_link_of
 from ..mbs.model.model import Model
-from ..mbs.quantities.attachment_error import PieceInMotion, missed_by_pieces
-from ..mbs.quantities.motion import modal_coordinates, node_of, section_motion
+from ..mbs.quantities.attachment_error import missed_by_pieces
+from ..mbs.quantities.motion import modal_coordinates
 from ..mbs.quantities.second_order import IN_MOTION, Missing, largest_displacement
 from ..mbs.quantities.validity import ENOUGH, Bending, enough_pieces, link_bending, shape_from_chord
 from ..mbs.run.context import WholeLinks
@@ -91,14 +91,10 @@ def bending_of_links(prepared: Prepared, run: Run) -> dict[str, Bending]:
 
 def _missing(prepared: Prepared, run: Run, name: str) -> Missing:
     """What the pieces of a link miss, which have geometric stiffening; in motion it makes the link vibrate besides."""
-    link, pieces = prepared.bodies[name].modal, []
+    link, names = prepared.bodies[name].modal, prepared.divided[name].names
     assert link is not None
-    for piece in prepared.divided[name].names:
-        modal, node = prepared.parts[piece].modal, node_of(run, piece)
-        assert modal is not None
-        ends = (section_motion(run, f"{piece}.{end}") for end in ("root", "tip"))
-        pieces.append(PieceInMotion(modal, node.body, run.q[:, node.p_q], *ends))
-    of_length = float(np.linalg.norm(missed_by_pieces(pieces), axis=1).max(initial=0.0)) / link.length
+    pieces = {piece: modal for piece in names if (modal := prepared.parts[piece].modal) is not None}
+    of_length = float(np.linalg.norm(missed_by_pieces(run, pieces), axis=1).max(initial=0.0)) / link.length
     of_length *= 1.0 if run.is_at_rest else IN_MOTION
     whole = largest_displacement(link, modal_coordinates(run, name))
     return Missing(of_length, min(1.0, of_length / whole) if whole else 0.0)

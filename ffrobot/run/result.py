@@ -17,14 +17,7 @@ from ..common.errors import InputError
 from ..common.structs import struct
 from ..mbs.model.known_motion import Wrench
 from ..mbs.posture.limits import left_ranges
-from ..mbs.quantities.attachment_error import (
-    Start,
-    mode_error,
-    modes_in_motion,
-    phase_error,
-    start_jolt,
-    start_of_motion,
-)
+from ..mbs.quantities.attachment_error import mode_error, start_errors, start_of_motion
 from ..mbs.quantities.motion import point_names, reported_points
 from ..mbs.quantities.reactions import Sharing, reactions, shared_evenly
 from ..mbs.quantities.settling import Settling, commanded_rest, end_points, settling
@@ -246,17 +239,17 @@ class AnalysisResult:
     @cached_property
     def mode_error(self) -> float | None:
         """Estimated error of too few modes, relative to peaks; None where it is not known."""
-        error = mode_error(modes_in_motion(self.run)) if self._is_integrated else None
-        return None if error is None else hypot(error, phase_error(self._start))
+        error = mode_error(self.run) if self._is_integrated else None
+        return None if error is None else hypot(error, self._start_errors[1])
 
-    @cached_property
+    @property
     def start_jolt(self) -> float:
         """Relative jump of acceleration at the start; see `attachment_error`."""
-        return start_jolt(self._start) if self._is_integrated else 0.0
+        return self._start_errors[0]
 
     @cached_property
-    def _start(self) -> Start:
-        return start_of_motion(self.run)
+    def _start_errors(self) -> tuple[float, float]:
+        return start_errors(start_of_motion(self.run)) if self._is_integrated else (0.0, 0.0)
 
     @property
     def _is_integrated(self) -> bool:

@@ -9,7 +9,7 @@ the same energy, ends where its sections, each turned from the last, take it (Si
 measured factor. What bending in one plane, at whatever angle, leaves is far less than what bending in two or twist do.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -19,20 +19,11 @@ from ...common.rotations import exponential, left_jacobian, logarithm
 from ...fe_models.modal_body import ModalBody
 from ..linear.vibration import elastic_shapes
 from ..model.body import Body, bent_section
-from ..model.kinematics import Motion
 from ..model.known_motion import mass_matrices
 from ..run.record import Run
-from .motion import constraint_rows
+from .motion import constraint_rows, node_of, section_motion
 
 JOLT = 0.01  # of the largest deformation: where more begins to ring at once, modes that are not there would ring, too
-
-
-class ModesInMotion(NamedTuple):
-    """Modal coordinates p, √kg·m, and p̈, √kg·m/s², (T, n) of one flexible body."""
-
-    body: Body
-    p: Array
-    p_ddot: Array
 
 
 class Start(NamedTuple):
@@ -51,15 +42,7 @@ class Start(NamedTuple):
     duration: float  # s
 
 
-class Ringing(NamedTuple):
-    """Vibrations in the first posture: ω² (m,), rad²/s², shapes (n_v, m) with φᵀMφ = 1, amplitudes (m,) of √(2 J)."""
-
-    squares: Array
-    shapes: Array
-    amplitudes: Array
-
-
-def mode_error(links: Iterable[ModesInMotion]) -> float | None:
+def mode_error(run: Run) -> float | None:
     """Estimated error of torques, reactions and deflections for too few modes, of their peaks; None: nothing is known.
 
     Attachment modes carry what the eigenmodes left out do statically. What these do besides, by their inertia, is
@@ -67,12 +50,15 @@ def mode_error(links: Iterable[ModesInMotion]) -> float | None:
     lowest attachment mode above it, ω_a (Rayleigh); ω_m² = ω_k ω_a. So δp = (1/ω_m² − 1/ω²) p̈, and no more than they do
     at all: the largest p counts where attachment modes ring at their own ω, as after a jump of the acceleration. The
     estimate is the largest √(δpᵀ K δp) of a link against the largest √(pᵀ K p). What rings from the start on gets out
-    of step besides: `phase_error`. Both together are 0.2 to 5 times the error of the worst torque of arms with two or
+    of step besides: `start_errors`. Both together are 0.2 to 5 times the error of the worst torque of arms with two or
     more modes, up to 10 times it with one (tests/mbs/test_mode_error.py). What bends a link across the axes of all
     motors counts too: reactions feel it, motors do not. Nothing is known of links without attachment modes.
     """
     ratios = []
-    for body, p, p_ddot in links:
+    for node in run.model.tree.nodes:
+        body, p, p_ddot = node.body, run.q[:, node.p_q], run.a[:, node.p_v]
+        if not body.n_modes:
+            continue
         if not body.attachment_modes or not body.n_eigenmodes:
             return None
         late = _late(body)
@@ -89,51 +75,27 @@ def _late(body: Body) -> Array:
     return np.maximum(1.0 / np.sqrt(highest * lowest_after) - 1.0 / body.stiffness, 0.0)
 
 
-def start_jolt(start: Start) -> float:
-    """Return the share of a motion's largest deformation that begins to vibrate at once at its start.
+def start_errors(start: Start) -> tuple[float, float]:
+    """Return the shares of a motion's largest deformation that vibrate from its start on, and are out of phase then.
 
-    The amplitudes of `start_vibrations` against the largest √(Σ pᵀ K p) of all links. It is 0 on smooth paths from
+    The latter for too few modes; both of the largest √(Σ pᵀ K p) of all links. The former is 0 on smooth paths from
     equilibrium, 0.1 to 1 where links start undeformed under gravity, or a path with a jump of its acceleration.
-    """
-    return _of_largest(start, start_vibrations(start).amplitudes) if start.largest else 0.0
-
-
-def phase_error(start: Start) -> float:
-    """Return the phase error of initial vibrations for too few modes, relative to the largest deformation.
-
-    With the attachment modes as late as `mode_error` has them, Rayleigh's quotient lowers the frequency ω_i of a
-    vibration φ_i by δω_i/ω_i = ½ Σ_a K_a φ_ia² (1/ω_m² − 1/ω_a²). Its phase is off by δω_i T at the end of the run, and
-    matters most when damping δ_i has left 1/e of it: by δω_i/(e δ_i) at most.
-    """
-    if not start.largest:
-        return 0.0
-    vibrations = start_vibrations(start)
-    slower = 0.5 * (start.stiffness * start.late) @ vibrations.shapes**2
-    decay = 0.5 * np.einsum("ki,kl,li->i", vibrations.shapes, start.damping, vibrations.shapes)
-    time = start.duration / np.maximum(1.0, np.e * decay * start.duration)
-    return _of_largest(start, vibrations.amplitudes * np.minimum(2.0, np.sqrt(vibrations.squares) * slower * time))
-
-
-def start_vibrations(start: Start) -> Ringing:
-    """Return vibrations of the links that begin at the start of a run, under its constraints.
 
     Vibration i of shape φ_i and frequency ω_i has the share z̈_i = φ_iᵀ K q̈/ω_i² of the first accelerations q̈. It begins
-    z̈_i/ω_i² away from its center; its amplitude is z̈_i/ω_i in √(2 J).
+    z̈_i/ω_i² away from its center; its amplitude is z̈_i/ω_i in √(2 J). With the attachment modes as late as `mode_error`
+    has them, Rayleigh's quotient lowers ω_i by δω_i/ω_i = ½ Σ_a K_a φ_ia² (1/ω_m² − 1/ω_a²). Its phase is off by δω_i T
+    at the end of the run, and matters most when damping δ_i has left 1/e of it: by δω_i/(e δ_i) at most.
     """
+    if not start.largest:
+        return 0.0, 0.0
     squares, shapes = elastic_shapes(start.M, np.diag(start.stiffness), start.C_q)
-    accelerations = shapes.T @ (start.stiffness * start.a) / squares
-    return Ringing(squares, shapes, accelerations / np.sqrt(squares))
-
-
-def _of_largest(start: Start, amplitudes: Array) -> float:
-    return float(np.sqrt((amplitudes**2).sum() / start.largest))
-
-
-def modes_in_motion(run: Run) -> Iterator[ModesInMotion]:
-    """Yield the modal motion of the flexible bodies of a run."""
-    for node in run.model.tree.nodes:
-        if node.body.n_modes:
-            yield ModesInMotion(node.body, run.q[:, node.p_q], run.a[:, node.p_v])
+    amplitudes = shapes.T @ (start.stiffness * start.a) / squares**1.5
+    slower = 0.5 * (start.stiffness * start.late) @ shapes**2
+    decay = 0.5 * np.einsum("ki,kl,li->i", shapes, start.damping, shapes)
+    time = start.duration / np.maximum(1.0, np.e * decay * start.duration)
+    late = amplitudes * np.minimum(2.0, np.sqrt(squares) * slower * time)
+    jolt, off = (float(np.sqrt((of**2).sum() / start.largest)) for of in (amplitudes, late))
+    return jolt, off
 
 
 def start_of_motion(run: Run) -> Start:
@@ -148,8 +110,6 @@ def start_of_motion(run: Run) -> Start:
             late[node.p_v] = _late(node.body)
     (M,), sizes = mass_matrices(run.model, run.q[:1], float(run.time[0])), run.model.natural_sizes
     both = np.outer(sizes, sizes)
-    duration = float(run.time[-1] - run.time[0])
-    largest = float(energy.max(initial=0.0))
     return Start(
         M=M * both,
         C_q=constraint_rows(run)[1][0] * sizes / run.model.row_sizes[:, None],
@@ -157,8 +117,8 @@ def start_of_motion(run: Run) -> Start:
         stiffness=stiffness * sizes**2,
         damping=damping * both,
         late=late,
-        largest=largest,
-        duration=duration,
+        largest=float(energy.max(initial=0.0)),
+        duration=float(run.time[-1] - run.time[0]),
     )
 
 
@@ -166,44 +126,34 @@ INTERVALS = 16  # of a piece, over each of which curvature is constant but for i
 X = np.array([1.0, 0.0, 0.0])
 
 
-class PieceInMotion(NamedTuple):
-    """A piece: its modal body, its equations, its p (T, n) in these, and its sections at root and tip over time."""
-
-    modal: ModalBody
-    body: Body
-    p: Array
-    root: Motion
-    tip: Motion
-
-
-class RodEnds(NamedTuple):
-    """The section at the tip of a piece seen from that at its root: axes A (T, 3, 3), place r (T, 3) m."""
-
-    A: Array
-    r: Array
-
-
-def missed_by_pieces(pieces: Sequence[PieceInMotion]) -> Array:
-    """Return the position error (T, 3), m, global axes, of the tip of the last piece; pieces from the root."""
-    end, missed = pieces[-1].tip.r, np.zeros_like(pieces[-1].tip.r)
-    for piece in pieces:
-        rod = rod_ends(piece.modal, piece.p @ piece.body.modal_transform.T)
-        known = ends_in_equations(piece.body, piece.p)
-        turn = logarithm(rod.A @ np.swapaxes(known.A, -1, -2))
-        moved, turned = (np.einsum("tij,tj->ti", piece.root.F, off) for off in (rod.r - known.r, turn))
-        missed += moved + np.cross(turned, end - piece.tip.r)
+def missed_by_pieces(run: Run, pieces: Mapping[str, ModalBody]) -> Array:
+    """Return the position error (T, 3), m, global axes, of the tip of the last of `pieces`, from the root on."""
+    ends = {piece: [section_motion(run, f"{piece}.{end}") for end in ("root", "tip")] for piece in pieces}
+    end = [*ends.values()][-1][1].r
+    missed = np.zeros_like(end)
+    for piece, (root, tip) in ends.items():
+        node = node_of(run, piece)
+        p = run.q[:, node.p_q]
+        A, r = rod_ends(pieces[piece], p @ node.body.modal_transform.T)
+        A_known, r_known = ends_in_equations(node.body, p)
+        turn = logarithm(A @ np.swapaxes(A_known, -1, -2))
+        moved, turned = (np.einsum("tij,tj->ti", root.F, off) for off in (r - r_known, turn))
+        missed += moved + np.cross(turned, end - tip.r)
     return missed
 
 
-def ends_in_equations(body: Body, p: Array) -> RodEnds:
-    """Return the ends of a piece as its equations contain them, at p (T, n), √kg·m."""
+def ends_in_equations(body: Body, p: Array) -> tuple[Array, Array]:
+    """Return `rod_ends` of a piece as its equations contain them, at p (T, n), √kg·m."""
     root, tip = (bent_section(body, end, p) for end in ("root", "tip"))
     back = np.swapaxes(exponential(root.phi), -1, -2)
-    return RodEnds(back @ exponential(tip.phi), np.einsum("tij,tj->ti", back, tip.u - root.u))
+    return back @ exponential(tip.phi), np.einsum("tij,tj->ti", back, tip.u - root.u)
 
 
-def rod_ends(modal: ModalBody, p: Array) -> RodEnds:
-    """Return the ends of the rod with the strains of p (T, n), √kg·m, of the file."""
+def rod_ends(modal: ModalBody, p: Array) -> tuple[Array, Array]:
+    """Return axes (T, 3, 3) and place (T, 3), m, of the tip, seen from the root, of a rod with the strains of p (T, n).
+
+    p: √kg·m, of the file.
+    """
     x = np.linspace(0.0, modal.length, 2 * INTERVALS + 1)  # with the middles of intervals
     places, h = [modal.interpolate(at) for at in x], x[2]
     phi, u = (
@@ -217,4 +167,4 @@ def rod_ends(modal: ModalBody, p: Array) -> RodEnds:
         uneven = np.cross(mean - phi[k] - turn / 2, h * X)  # of curvature
         step = np.einsum("tij,tj->ti", left_jacobian(turn), h * X + strain) + uneven
         r, A = r + np.einsum("tij,tj->ti", A, step), A @ exponential(turn)
-    return RodEnds(A, r)
+    return A, r

@@ -30,7 +30,6 @@ from ..model.nodes import Node, Section
 from ..model.system import MultibodySystem
 from ..model.tree import CutCoordinate, CutMotion
 from ..run.record import Run
-from ..scene.space import Space
 
 AT_END = 1e-9  # of the length
 X = np.array([1.0, 0.0, 0.0])
@@ -41,12 +40,11 @@ class BodyMotion:
     """Motion of a body's frame and modes, one row per output, in global axes.
 
     Attributes:
-        position: (T, d) R, m.
-        orientation: in the plane (T,) θ, rad; in 3D (T, 4) quaternions of continuous sign.
-        velocity: (T, d) m/s.
-        angular_velocity: in the plane (T,), in 3D (T, 3), rad/s.
-        modal, modal_velocity: (T, n), √kg·m and √kg·m/s, in the modes of the modal body file; of planar bodies with
-            fewer modes in the coordinates of the equations.
+        position: (T, 3) R, m.
+        orientation: (T, 4) quaternions of continuous sign.
+        velocity: (T, 3) m/s.
+        angular_velocity: (T, 3) rad/s.
+        modal, modal_velocity: (T, n), √kg·m and √kg·m/s, in the modes of the modal body file.
     """
 
     position: Array
@@ -55,49 +53,6 @@ class BodyMotion:
     angular_velocity: Array
     modal: Array
     modal_velocity: Array
-
-    @property
-    def datasets(self) -> dict[str, Array]:
-        """Arrays by their names in results files."""
-        return _named(vars(self))
-
-    def within(self, space: Space, angle: Array) -> BodyMotion:
-        """Return the components of a 3D motion that `space` has; planar ones have `angle` (T,), rad, no quaternions."""
-        return replace(
-            self,
-            position=space.along(self.position),
-            orientation=angle if space.is_plane else self.orientation,
-            velocity=space.along(self.velocity),
-            angular_velocity=space.about(self.angular_velocity),
-        )
-
-
-@struct
-class PointMotion:
-    """Motion of a point of a body: position (T, d) m, deflection Φ p (T, d) m in body axes.
-
-    `orientation` (T, 4) of the section there in 3D, quaternions of continuous sign; None in the plane.
-    """
-
-    position: Array
-    deflection: Array
-    orientation: Array | None = None
-
-    @property
-    def datasets(self) -> dict[str, Array]:
-        """Arrays by their names in results files."""
-        return _named({key: values for key, values in vars(self).items() if values is not None})
-
-    def within(self, space: Space) -> PointMotion:
-        """Return the components of a 3D motion that `space` has."""
-        turned = None if space.is_plane else self.orientation
-        return PointMotion(space.along(self.position), space.along(self.deflection), turned)
-
-
-def _named(datasets: dict[str, Array]) -> dict[str, Array]:
-    """With an orientation as angle or quaternion."""
-    kinds = {1: "angle", 2: "quaternion"}
-    return {kinds[values.ndim] if key == "orientation" else key: values for key, values in datasets.items()}
 
 
 def continuous(e: Array) -> Array:
@@ -316,15 +271,8 @@ def section_motion(run: Run, point: str) -> Motion:
     return places(run).at(run.model.tree.section(place))
 
 
-def point_motion(run: Run, point: str) -> PointMotion:
-    """Motion of the section "BODY.POINT"; its deflection from its place in the body, or in the whole link."""
-    at = section_motion(run, point)
-    turned = None if run.space.is_plane else continuous(quaternions(at.F))
-    return PointMotion(at.r, deflection(run, point), turned)
-
-
 def deflection(run: Run, point: str) -> Array:
-    """Φ p (T, 3), m, of the section "BODY.POINT" in the axes of its body or link."""
+    """Φ p (T, 3), m, of the section "BODY.POINT" from its place in its body or link, in the axes of that."""
     name, _, label = point.partition(".")
     if name in run.links:
         frame, r = _links(run)[name], section_motion(run, point).r

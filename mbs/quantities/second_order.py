@@ -27,16 +27,6 @@ from ...fe_models.modal_body import ModalBody
 AT_ONCE = 64  # outputs whose eigenvalues are found together
 
 
-class StiffnessChange(NamedTuple):
-    """Largest |μ| over a run, and the ratio of loads to buckling loads.
-
-    `buckling` is −μ of the lowest, exact from 1 on; 0 where no loads soften the link.
-    """
-
-    largest: float = 0.0
-    buckling: float = 0.0
-
-
 class LoadedPoint(NamedTuple):
     """Interface at `position` (3,), m, with mode shapes (6, n) and stiffness K (6, n, n) by unit load there."""
 
@@ -76,7 +66,7 @@ def lasting(loads: ModalLoads, time: Array) -> ModalLoads:
 
     The loads themselves if they stay below those that buckle the link.
     """
-    if len(time) < 2 or not len(loads.stiffness) or stiffness_change(loads).largest < 1.0:
+    if len(time) < 2 or not len(loads.stiffness) or stiffness_change(loads)[0] < 1.0:
         return loads
     half = min(np.pi / float(np.sqrt(loads.stiffness.min())), 0.5 * float(time[-1] - time[0]))
     impulse = np.vstack(
@@ -88,14 +78,17 @@ def lasting(loads: ModalLoads, time: Array) -> ModalLoads:
     return replace(loads, f=(last - first) / (2 * half))
 
 
-def stiffness_change(loads: ModalLoads) -> StiffnessChange:
-    """Return the change of stiffness by the loads of a run."""
+def stiffness_change(loads: ModalLoads) -> tuple[float, float]:
+    """Return the largest |μ| by the loads of a run, and −μ of the lowest, exact from 1 on: loads over buckling loads.
+
+    The latter is 0 where no loads soften the link.
+    """
     largest, lowest = 0.0, 0.0
     for bound, mu in _eigenvalues(loads):
         largest, lowest = max(largest, float(np.abs(mu).max())), min(lowest, float(mu.min()))
         if bound <= largest and bound <= max(1.0, -lowest):
             break
-    return StiffnessChange(largest, -lowest)
+    return largest, -lowest
 
 
 def _eigenvalues(loads: ModalLoads) -> Iterator[tuple[float, Array]]:

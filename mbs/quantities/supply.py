@@ -85,24 +85,18 @@ def behind_gears(run: Run) -> Run:
     return replace(run, model=model, q=q, v=v, a=a)
 
 
-def gear_moment(run: Run, joint: str) -> Array | None:
-    """Return the torque (T,), N·m, of a compliant gear on the second side of its joint; None without one."""
-    if joint in (gears := gear_motions(run)):
-        return gears[joint].gear_moment
+def motor_motion(run: Run, joint: str) -> tuple[Array, Array, Array] | None:
+    """Return angle and rate (T,), rad, rad/s, of the motor behind a compliant gear at its joint; None without one.
+
+    And the torque (T,), N·m, of the gear on the second side of the joint.
+    """
+    if (known := gear_motions(run).get(joint)) is not None:
+        return known.angle, known.rate, known.gear_moment
     for gear in run.model.tree.gears:
         if gear.joint.joint.name == joint:
             way, rate = gear.twist(run.q, run.v)
-            return gear.spring.moment(way) + gear.damping * rate
-    return None
-
-
-def motor_motion(run: Run, joint: str) -> tuple[Array, Array] | None:
-    """Return angle and rate (T,), rad, rad/s, of the motor behind a compliant gear at its joint; None without one."""
-    if joint in (gears := gear_motions(run)):
-        return gears[joint].angle, gears[joint].rate
-    for gear in run.model.tree.gears:
-        if gear.joint.joint.name == joint:
-            return run.q[:, gear.motor.q.start], run.v[:, gear.motor.v.start]
+            torque = gear.spring.moment(way) + gear.damping * rate
+            return run.q[:, gear.motor.q.start], run.v[:, gear.motor.v.start], torque
     return None
 
 

@@ -24,7 +24,6 @@ from .second_order import (
     Missing,
     ModalLoads,
     Rotations,
-    StiffnessChange,
     largest_displacement,
     largest_lengths,
     largest_rotations,
@@ -134,13 +133,13 @@ def _bending_of(run: Run, name: str, link: ModalBody, sizes: Mapping[str, Array]
     deflection, rotation, shortening = shape_from_chord(link, p)
     peaks = (deflection / link.length, rotation, shortening, force * shortening)
     w, phi, s, moment = (float(x.max(initial=0.0)) for x in peaks)
-    change, missing, rotations = StiffnessChange(), Missing(0.0, 0.0), largest_rotations(link, p)
+    change, buckling, missing, rotations = 0.0, 0.0, Missing(0.0, 0.0), largest_rotations(link, p)
     if body.n_modes:
         on_modes = lasting(_on_modes(link, run, name, sizes), run.time)
-        change = stiffness_change(on_modes)
+        change, buckling = stiffness_change(on_modes)
         if body.stiffening is not None:
             displacement = largest_displacement(link, p)
-            missing = missing_to_second_order(displacement, s / link.length, rotations, change.largest)
+            missing = missing_to_second_order(displacement, s / link.length, rotations, change)
         else:
             stations, places = link.stations.translation @ T, link.stations.position
             missing = missing_to_first_order(on_modes, own, stations, places, link.length, is_at_rest=run.is_at_rest)
@@ -149,12 +148,12 @@ def _bending_of(run: Run, name: str, link: ModalBody, sizes: Mapping[str, Array]
         rotation=phi,
         foreshortening=s,
         foreshortening_moment=moment,
-        stiffness_change=change.largest,
+        stiffness_change=change,
         length=link.length,
         is_stiffened=body.stiffening is not None,
         missing=missing,
         rotations=rotations,
-        buckling=change.buckling,
+        buckling=buckling,
     )
 
 

@@ -8,7 +8,7 @@ from patches_on_links import CERAMIC
 import ffrobot
 from ffrobot.actuation.motors import path_jump
 from ffrobot.actuation.patches.link_patches import link_patches, with_count
-from ffrobot.mbs.quantities.motion import point_motion
+from ffrobot.mbs.quantities.motion import deflection
 from ffrobot.mbs.quantities.supply import actuator_forces
 from ffrobot.run.solve import solve_scene
 
@@ -147,7 +147,7 @@ def test_predicted_shift_of_the_tip_is_what_happens():
     for volts in (voltages.required[0], voltages.within_limit[0]):
         load = {"pzt": "link", "voltage": [f"{v!r}" for v in volts.tolist()]}
         held = arm({"kind": "static"}, STILL, load=[load])
-        tips.append(point_motion(held.analyses["motion"].run, "link.tip").deflection[0, 1])
+        tips.append(deflection(held.analyses["motion"].run, "link.tip")[0, 1])
     assert abs(tips[0]) < 1e-12  # straight
     np.testing.assert_allclose(
         straight.analyses["motion"].predicted_shift["link.tip"][0], [0.0, tips[1], 0.0], rtol=1e-9, atol=1e-15

@@ -6,7 +6,7 @@ from beam_links import beam_link, rectangle
 
 import ffrobot as library
 from ffrobot.actuation import feasibility
-from ffrobot.mbs.quantities.motion import plane_angle, point_motion
+from ffrobot.mbs.quantities.motion import plane_angle, section_motion
 from ffrobot.run.solve import solve_scene
 
 GEARED = {"gear_ratio": 80.0, "rotor_inertia": 2e-5}
@@ -77,7 +77,7 @@ def one(*later):
 
 def miss(solution, name, point):
     """Distance (T,) m of the point in a run from where it is in "inverse"."""
-    run, path = (point_motion(solution.analyses[analysis].run, point).position for analysis in (name, "inverse"))
+    run, path = (section_motion(solution.analyses[analysis].run, point).r for analysis in (name, "inverse"))
     return np.linalg.norm(run - path[: len(run)], axis=1)
 
 
@@ -125,7 +125,7 @@ def test_sag_at_the_start():
     angle = float(plane_angle(solution.analyses["inverse"].run, "link1")[0])
     held = [{"name": "still", "joint": "J1", "value": f"{angle!r}"}]
     static = solve_scene(chain((0.8,), (0.012,), (-0.2,), 0.5, {}, held, [{"name": "inverse", "kind": "static"}]))
-    tips = [point_motion(s.analyses["inverse"].run, "link1.tip").position[0] for s in (solution, static)]
+    tips = [section_motion(s.analyses["inverse"].run, "link1.tip").r[0] for s in (solution, static)]
     assert np.linalg.norm(tips[1] - tips[0]) == pytest.approx(found(solution).at_start, rel=0.01)
 
 

@@ -14,8 +14,7 @@ from ffrobot.mbs import _core
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.posture.path_start import path_start
 from ffrobot.mbs.posture.start import undeformed_posture
-from ffrobot.mbs.quantities import motion
-from ffrobot.mbs.quantities.motion import acting_forces, body_motion, node_of, plane_angle
+from ffrobot.mbs.quantities.motion import acting_forces, body_motion, node_of, plane_angle, section_motion
 from ffrobot.mbs.quantities.reactions import reactions
 from ffrobot.mbs.quantities.supply import actuator_forces, motor_moments, path_force, totals
 from ffrobot.mbs.run.context import Context
@@ -116,9 +115,9 @@ def run(robot, analysis, source=None, patches=None, progress=always, earlier=Non
     return Seen(robot, analysis.run(context))
 
 
-def point_motion(seen, point):
-    """Position and deflection (T, 2) of "BODY.POINT"."""
-    return motion.point_motion(seen.motion, point).within(seen.motion.space)
+def place_of(seen, point):
+    """Position (T, 2) of "BODY.POINT"."""
+    return section_motion(seen.motion, point).r[:, :2]
 
 
 def joint_forces(seen, joint):

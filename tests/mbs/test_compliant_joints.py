@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from links import ANGLES, TIP, arm, arm_links, quintic, ritz_link
 from mechanisms import checked_scene, forward, make_model, pcid, relative, revolute
-from oracle_runs import energy_and_losses, point_motion, run
+from oracle_runs import energy_and_losses, place_of, run
 from rods import rod
 
 from ffrobot.common.errors import InputError
@@ -14,7 +14,7 @@ from ffrobot.mbs.joints.joint import StiffnessSteps, TwistSpring
 from ffrobot.mbs.linear.joint_conditions import joint_conditions
 from ffrobot.mbs.linear.linearisation import LinearEquations
 from ffrobot.mbs.model.gears import with_compliance
-from ffrobot.mbs.quantities.supply import gear_moment, gear_motions, motor_motion
+from ffrobot.mbs.quantities.supply import gear_motions, motor_motion
 from ffrobot.mbs.run.gears import unresolved_gears, with_motor_coordinates
 
 L, M, J, N, K = 0.7, 2.0, 3e-3, 9.0, 500.0
@@ -61,7 +61,7 @@ def carried_out(model, end=1.0):
     outcome = run(model, replay, source)
     assert outcome.status == "completed"
     tip = f"{model.bodies[-1].name}.tip"
-    error = point_motion(outcome, tip).position - point_motion(source, tip).position
+    error = place_of(outcome, tip) - place_of(source, tip)
     return np.linalg.norm(error, axis=1), source, outcome
 
 
@@ -82,7 +82,7 @@ def test_motors_alone_carry_flexible_links_behind_gears_that_give(second, left):
     source = run(model, servo)
     replay = forward(actuation="servo", apply="joints", tolerance=1e-8, output_step=0.005)
     outcome = run(model, replay, source)
-    error = point_motion(outcome, "link2.tip").position - point_motion(source, "link2.tip").position
+    error = place_of(outcome, "link2.tip") - place_of(source, "link2.tip")
     assert np.linalg.norm(error, axis=1).max() < left
 
 
@@ -178,7 +178,7 @@ def test_a_gear_that_stiffens_swings_as_two_sinusoids():
     twist = motor_motion(outcome.motion, "O")[0] - outcome.q[:, 2]
     assert relative(twist, expected) < 1e-6
     assert most > 1.5 * KNEE / K1
-    gear = gear_moment(outcome.motion, "O")
+    gear = motor_motion(outcome.motion, "O")[2]
     beyond = np.abs(twist) > KNEE / K1
     np.testing.assert_allclose(gear, np.where(beyond, KNEE + K2 * (twist - KNEE / K1), K1 * twist), atol=1e-12)
     work = tau * motor_motion(outcome.motion, "O")[0]

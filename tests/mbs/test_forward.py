@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from links import arm
 from mechanisms import forward, pcid
-from oracle_runs import point_motion, run
+from oracle_runs import place_of, run
 from patch_sets import FULL
 
 from ffrobot.mbs.model.body import transformed
@@ -27,7 +27,7 @@ def pair(model, apply, tolerance, actuator_set=FULL, **of_forward):
 
 def departure(inverse, outcome):
     """Of the tip, relative to its way: (T,)."""
-    tips = [point_motion(o, "link2.tip").position for o in (inverse, outcome)]
+    tips = [place_of(o, "link2.tip") for o in (inverse, outcome)]
     return np.linalg.norm(tips[1] - tips[0], axis=1) / np.ptp(tips[0], axis=0).max()
 
 

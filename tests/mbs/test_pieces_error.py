@@ -42,19 +42,19 @@ OBLIQUE, HELIX = np.array([0.0, 0.9, -1.7]), np.array([0.8, 0.9, -1.7])
 
 
 def test_constant_curvature_bends_to_a_helix(piece):
-    found = rod_ends(piece, bent(piece, OBLIQUE, HELIX))
+    A, r = rod_ends(piece, bent(piece, OBLIQUE, HELIX))
     for k, curvature in enumerate((OBLIQUE, HELIX)):
-        np.testing.assert_allclose(found.A[k], Rotation.from_rotvec(curvature * L).as_matrix(), atol=1e-9)
-        np.testing.assert_allclose(found.r[k], left_jacobian(curvature * L) @ [L, 0.0, 0.0], atol=1e-9)
+        np.testing.assert_allclose(A[k], Rotation.from_rotvec(curvature * L).as_matrix(), atol=1e-9)
+        np.testing.assert_allclose(r[k], left_jacobian(curvature * L) @ [L, 0.0, 0.0], atol=1e-9)
 
 
 def test_equations_miss_the_third_order(piece):
     """Of twist and bending in two planes, halved strains an eighth; of bending in one plane no rotation at all."""
     body = from_modal_body("piece", piece, stiffened=True)
     p = bent(piece, HELIX, HELIX / 2, OBLIQUE)
-    rod, known = rod_ends(piece, p), ends_in_equations(body, p)
-    turned = np.linalg.norm(logarithm(rod.A @ np.swapaxes(known.A, -1, -2)), axis=1)
-    moved = np.linalg.norm(rod.r - known.r, axis=1) / L
+    (A, r), (A_known, r_known) = rod_ends(piece, p), ends_in_equations(body, p)
+    turned = np.linalg.norm(logarithm(A @ np.swapaxes(A_known, -1, -2)), axis=1)
+    moved = np.linalg.norm(r - r_known, axis=1) / L
     for missed in (turned, moved):
         assert np.log2(missed[0] / missed[1]) == pytest.approx(3.0, abs=0.3)
     assert turned[2] < 1e-9 < turned[1]
