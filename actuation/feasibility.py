@@ -15,7 +15,7 @@ from ..common.structs import struct
 from ..fe_models.modal_body import ModalBody
 from ..mbs.model.body import Body
 from ..mbs.model.known_motion import mass_matrices
-from ..mbs.model.motors import split_forces
+from ..mbs.model.system import split_forces
 from ..mbs.quantities.motion import modal_coordinates, node_of, point_names
 from ..mbs.quantities.supply import actuator_forces, motors_fit
 from ..mbs.run.record import Run

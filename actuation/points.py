@@ -23,7 +23,7 @@ from ..fe_models.modal_body import ModalBody
 from ..mbs.fields.field_types import Name, Reference
 from ..mbs.fields.spelling import IN_PLANE, IN_SPACE
 from ..mbs.model.body import Body, BodyPoint
-from ..mbs.model.motors import path_forces, path_forces_on_bodies
+from ..mbs.model.system import path_forces, path_forces_on_bodies
 from ..mbs.run.record import Run
 from ..mbs.scene.space import SPACES, Space
 

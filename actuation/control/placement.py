@@ -25,7 +25,7 @@ from ...mbs.analysis.operating_points import InstantAnalysis, find_operating_poi
 from ...mbs.fields.field_types import ModeCount, Name, PatchCount, PointReference, Positive, Reference, under
 from ...mbs.linear.linearisation import LinearEquations
 from ...mbs.model.gears import with_compliance
-from ...mbs.model.motors import motor_forces
+from ...mbs.model.system import motor_forces
 from ...mbs.run.record import Details, Run
 from ...mbs.run.replay import supplied_in
 from ...mbs.scene.analysis import Surroundings

@@ -19,8 +19,7 @@ from ..linear.statics import modal_sizes, static_shapes
 from ..model.body import Body
 from ..model.gears import refuse_prescribed_motors
 from ..model.model import Model
-from ..model.motors import driven_mechanism, fastest_mechanism
-from ..model.system import MultibodySystem
+from ..model.system import MultibodySystem, driven_mechanism, fastest_mechanism
 from ..posture.prescribed import PrescribedMotion, left_slopes, prescribed_motion
 from ..posture.start import shape_in_redundant_loops
 from ..run.context import Context

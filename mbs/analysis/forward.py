@@ -18,7 +18,7 @@ from ..model.drives import Command, Drives, Replayed
 from ..model.gears import with_compliance
 from ..model.known_motion import State
 from ..model.model import Model
-from ..model.motors import motor_commands
+from ..model.system import motor_commands
 from ..posture.posture import mobility
 from ..posture.start import displaced_joints, undeformed_posture
 from ..run.context import Context, PatchedLink

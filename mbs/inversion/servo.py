@@ -16,8 +16,8 @@ from .. import _core
 from .._core import TimeFunction
 from ..linear.statics import modal_sizes
 from ..model.model import Model
-from ..model.motors import driven_mechanism, fastest_mechanism
 from ..model.nodes import ConstraintRow
+from ..model.system import driven_mechanism, fastest_mechanism
 from ..posture.posture import check_smooth, describe_posture, mobility, worst_posture
 from ..posture.prescribed import PrescribedMotion, following_motors, left_slopes
 from ..posture.reach import out_of_reach

@@ -21,9 +21,8 @@ from ...common.rotations import skew
 from ...common.structs import struct
 from ..model.known_motion import KnownStates, required_forces
 from ..model.model import Model
-from ..model.motors import FrameShare, frame_share, turning_motors
 from ..model.nodes import Node
-from ..model.system import MultibodySystem
+from ..model.system import FrameShare, MultibodySystem, frame_share, turning_motors
 from ..scene.space import SPACES
 from .vibration import gear_matrices
 

@@ -9,8 +9,8 @@ from ...common.arrays import Array, as_list
 from ...common.errors import SolveError
 from .. import _core
 from ..model.model import Model
-from ..model.motors import frame_share, turning_motors
 from ..model.nodes import rows_of_joint
+from ..model.system import frame_share, turning_motors
 
 
 class Prescribed(NamedTuple):

@@ -17,8 +17,8 @@ from ...common.libraries import scipy
 from .. import _core
 from ..fields.waypoints import spline
 from ..model.model import Model
-from ..model.motors import driven_mechanism
 from ..model.nodes import Node, coordinate_row, rows_of_joint
+from ..model.system import driven_mechanism
 from .posture import Mobility, mobility
 from .prescribed import joint_places, prescribed_motion
 from .start import undeformed_posture

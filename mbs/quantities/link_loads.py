@@ -15,8 +15,8 @@ from ...fe_models.modal_body.unit_loads import PAIRS, interface_load_names
 from ..fields.field_types import split_point
 from ..model.known_motion import MotionForces, Wrench, motion_forces, required_forces
 from ..model.masses import turns_as_a_body
-from ..model.motors import split_forces
 from ..model.nodes import Section
+from ..model.system import split_forces
 from ..run.record import Run
 from ..scene.bodies import tensor
 from .motion import acting_forces, places, system_of

@@ -12,7 +12,7 @@ from ...common.arrays import Array
 from ...common.structs import kept, struct
 from ..model.divided_link import spread_of
 from ..model.gears import compliance, with_compliance
-from ..model.motors import MotorForces
+from ..model.system import MotorForces
 from ..posture.posture import mobility
 from ..run.gears import Supplied, supplied_through_gears, with_motors
 from ..run.record import GearMotion, Run

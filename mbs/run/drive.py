@@ -17,8 +17,7 @@ from ..fields.waypoints import spline
 from ..model.drives import NO_DRIVES, Command, Drives, PointDrive
 from ..model.known_motion import State
 from ..model.model import Model
-from ..model.motors import integrated_mechanism
-from ..model.system import MultibodySystem, zero_order_hold
+from ..model.system import MultibodySystem, integrated_mechanism, zero_order_hold
 from ..posture.limits import left_ranges, watch_limits
 from ..posture.posture import (
     JUMP,

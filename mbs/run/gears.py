@@ -22,8 +22,8 @@ from ..joints.joint import TwistSpring
 from ..model.gears import compliance, elastic_joints, with_compliance
 from ..model.known_motion import KnownStates, States, required_forces, rotor_torques
 from ..model.model import Model
-from ..model.motors import MotorForces, motor_forces, turning_motors
 from ..model.nodes import Node, rotor
+from ..model.system import MotorForces, motor_forces, turning_motors
 from .record import GearCurve, GearMotion, Run
 from .replay import supplied_in
 

@@ -16,10 +16,9 @@ from .. import _core
 from .._core import TimeFunction
 from ..fields.waypoints import spline
 from ..model.model import Model
-from ..model.motors import driven_mechanism, frames_in_core, integrated_mechanism, path_forces
 from ..model.nodes import ConstraintRow
 from ..model.projection import EXACT
-from ..model.system import MultibodySystem
+from ..model.system import MultibodySystem, driven_mechanism, frames_in_core, integrated_mechanism, path_forces
 from ..scene.analysis import TimedAnalysis, output_times
 from ..scene.loads import OF_POINT
 from .context import PatchedLink, PointsOfBody

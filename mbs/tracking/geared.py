@@ -19,8 +19,8 @@ from ..joints.joint import TwistSpring
 from ..model.gears import compliance, elastic_joints
 from ..model.known_motion import rotor_torques
 from ..model.model import Model
-from ..model.motors import turning_motors
 from ..model.nodes import rotor
+from ..model.system import turning_motors
 
 SAMPLES = 5  # along the path, at which the torque of a gear is found in two ways
 TINY = 1e-300

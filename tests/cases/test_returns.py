@@ -15,8 +15,7 @@ from ffrobot.mbs.analysis.fcid import Fcid
 from ffrobot.mbs.analysis.forward import Forward
 from ffrobot.mbs.analysis.pcid import Pcid
 from ffrobot.mbs.fields.field_types import Steps
-from ffrobot.mbs.model.motors import motor_commands, motor_forces
-from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.mbs.model.system import MultibodySystem, motor_commands, motor_forces
 from ffrobot.mbs.posture.path_start import path_start
 from ffrobot.mbs.run.context import Context
 from ffrobot.mbs.run.replay import supplied_in

@@ -5,7 +5,7 @@ import pytest
 from rods import arm_of_rods
 
 import ffrobot as program
-from ffrobot.mbs.model.motors import motor_forces, path_forces
+from ffrobot.mbs.model.system import motor_forces, path_forces
 from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
 

@@ -7,7 +7,7 @@ from beam_links import beam_link, rectangle
 from row_wrenches import on_body, row_wrenches
 
 import ffrobot
-from ffrobot.mbs.model.motors import path_forces_on_bodies
+from ffrobot.mbs.model.system import path_forces_on_bodies
 from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 

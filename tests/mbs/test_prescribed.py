@@ -20,9 +20,8 @@ from ffrobot.mbs import _core
 from ffrobot.mbs.fields.functions import state_function
 from ffrobot.mbs.inversion.servo import Servo
 from ffrobot.mbs.model.drives import Command, Drive
-from ffrobot.mbs.model.motors import turning_motors
 from ffrobot.mbs.model.nodes import ConstraintRow, Section
-from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.mbs.model.system import MultibodySystem, turning_motors
 from ffrobot.mbs.scene.loads import Load
 
 TIMES = np.array([0.0, 0.01, 0.01, 0.05])
