@@ -20,8 +20,8 @@ from ..model.body import Body
 from ..model.gears import refuse_prescribed_motors
 from ..model.model import Model
 from ..model.system import MultibodySystem, driven_mechanism, fastest_mechanism
+from ..posture.posture import shape_in_redundant_loops
 from ..posture.prescribed import PrescribedMotion, left_slopes, prescribed_motion
-from ..posture.start import shape_in_redundant_loops
 from ..run.context import Context
 from ..run.record import Prescription, Run, Statistics
 from ..scene.analysis import Check, TimedAnalysis

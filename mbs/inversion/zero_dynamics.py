@@ -17,7 +17,7 @@ from ...common.libraries import scipy
 from ...common.structs import struct
 from ..linear.statics import static_shapes
 from ..model.system import MultibodySystem
-from ..posture.start import shape_in_redundant_loops
+from ..posture.posture import shape_in_redundant_loops
 from .servo import Servo
 
 CENTRE = 1e-6  # |Re s| / |s| of zeros that count as undamped

@@ -22,7 +22,7 @@ from ..model.body import Body
 from ..model.known_motion import State
 from ..model.model import Model
 from ..model.system import MultibodySystem
-from ..posture.start import AWAY
+from ..posture.start import AWAY, rates_on_rows
 
 MOST_ITERATIONS = 60
 FEW_ITERATIONS = 12  # from a posture next to it
@@ -282,7 +282,7 @@ def _step(at: Balance, K: Array, free: Indices) -> Array:
 def static_equilibrium(model: Model, start: State) -> State:
     """The equilibrium at t = 0 near `start`; v is kept on Ċ = 0. Raises `SolveError` where there is none near it."""
     q = Statics(model).equilibrium(start.q)
-    return State(q, model.constraints.velocities(q, start.v))
+    return State(q, rates_on_rows(model, q, start.v))
 
 
 def static_shapes(

@@ -10,7 +10,6 @@ import numpy as np
 
 from ...common.arrays import Array, Booleans, Indices, as_list
 from ...common.structs import struct
-from .. import _core
 from ..scene.mechanism import MechanismScene
 from .drives import Drive
 from .kinematics import Kinematics
@@ -23,13 +22,13 @@ LARGEST_TURN = 0.5  # rad (and sizes of the robot) that a Newton step may move: 
 
 
 class Constraints(Kinematics):
-    """Equations C(q, t) = 0 of `rows`, SI; `length` of the robot, natural sizes of rows (rows,) and joints (n_v,)."""
+    """Equations C(q, t) = 0 of `rows`, SI; natural sizes of rows (rows,) and joints (n_v,)."""
 
     def __init__(
-        self, tree: KinematicTree, rows: Sequence[ConstraintRow], length: float, row_sizes: Array, joint_sizes: Array
+        self, tree: KinematicTree, rows: Sequence[ConstraintRow], row_sizes: Array, joint_sizes: Array
     ) -> None:
         super().__init__(tree.nodes, rows=rows)
-        self._rows, self._length, self._row_sizes, self._joint_sizes = rows, length, row_sizes, joint_sizes
+        self._rows, self._row_sizes, self._joint_sizes = rows, row_sizes, joint_sizes
 
     @cached_property
     def _senses(self) -> tuple[list[str], Kinematics]:
@@ -98,28 +97,6 @@ class Constraints(Kinematics):
             self.scene, as_list(times), q, beside=more, scales=scales, sizes=self._row_sizes, largest_step=farthest
         )
 
-    def velocities(self, q: Array, v: Array, locked: Booleans | None = None) -> Array:
-        """Return v (n_v,) moved onto Ċ = 0 at q (n_q,) and t = 0 by the least change of joints not `locked` (n_v,)."""
-        scales, now = self._joint_sizes if locked is None else np.where(locked, 0.0, self._joint_sizes), np.zeros(1)
-        (C_v,), (C_dot,) = self.natural_gradients(q[None], now, scales), self.rates(q[None], v[None], now)
-        moved: Array = v - scales * np.linalg.lstsq(C_v, C_dot / self._row_sizes, rcond=1e-10)[0]
-        return moved
-
-    def mobilities(self, q: Array, times: Array, loop_rank: int = -1) -> list[_core.Mobility]:
-        """Return the mobility with rigid links and gears at q (T, n_q) and `times` (T,), s.
-
-        Links may be bent, by which constraints of loops that are redundant with straight ones seem to lock joints:
-        `loop_rank` is their rank with straight ones.
-        """
-        is_path = [row.is_trajectory for row in self._rows]
-        return self.core.mobilities(self.scene, as_list(times), q, is_path, self._length, loop_rank)
-
-    def ratios(self, q: Array, times: Array, rank: int) -> Array:
-        """Return ratios (T,) of smallest to largest of `rank` singular values of all rows: see `mobilities`."""
-        is_path = [False] * len(self._rows)
-        motions = self.core.mobilities(self.scene, as_list(times), q, is_path, self._length, rank)
-        return np.array([at.loop_ratio for at in motions])
-
 
 @struct
 class Model:
@@ -147,7 +124,7 @@ class Model:
     @cached_property
     def constraints(self) -> Constraints:
         """The constraint rows in the core."""
-        return Constraints(self.tree, self.rows, self.size, self.row_sizes, self.joint_sizes)
+        return Constraints(self.tree, self.rows, self.row_sizes, self.joint_sizes)
 
     @cached_property
     def along_cut(self) -> AlongCut:

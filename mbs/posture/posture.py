@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ...common.arrays import Array, Booleans
+from ...common.arrays import Array, Booleans, Indices, as_list
 from ...common.errors import InputError, quoted
 from ...common.structs import struct
+from .. import _core
 from .._core import TimeFunction
 from ..model.model import Model
 
@@ -39,9 +40,26 @@ class Mobility:
     loop_rank: int
 
 
+def mobilities(model: Model, q: Array, times: Array, loop_rank: int = -1) -> list[_core.Mobility]:
+    """Return the mobility with rigid links and gears at q (T, n_q) and `times` (T,), s.
+
+    Links may be bent, by which constraints of loops that are redundant with straight ones seem to lock joints:
+    `loop_rank` is their rank with straight ones.
+    """
+    constraints, is_path = model.constraints, (~model.loop_rows).tolist()
+    return constraints.core.mobilities(constraints.scene, as_list(times), q, is_path, model.size, loop_rank)
+
+
+def singular_ratios(model: Model, q: Array, times: Array, rank: int) -> Array:
+    """Return ratios (T,) of smallest to largest of `rank` singular values of all rows: see `mobilities`."""
+    constraints, is_path = model.constraints, [False] * len(model.rows)
+    motions = constraints.core.mobilities(constraints.scene, as_list(times), q, is_path, model.size, rank)
+    return np.array([at.loop_ratio for at in motions])
+
+
 def mobility(model: Model, q: Array) -> Mobility:
     """The mobility with rigid links and gears at q (n_q,), rad and m."""
-    at = model.constraints.mobilities(q[None], np.zeros(1))[0]
+    at = mobilities(model, q[None], np.zeros(1))[0]
     freedom, left = at.free.shape[1] - len(model.tree.gears), _joints(model, _largest(at.left) > MOVES)
     return Mobility(freedom, at.followed, at.ratio, left, at.loop_rank)
 
@@ -66,15 +84,38 @@ def paths_by_bending(model: Model, q: Array) -> tuple[int, tuple[str, ...]]:
     if not is_loop.any() or not any(node.body.n_modes for node in model.tree.nodes):
         return 0, ()
     (C_v,) = model.constraints.natural_gradients(q[None], now)
-    moving = _largest(model.constraints.mobilities(q[None], now)[0].free) > MOVES
+    moving = _largest(mobilities(model, q[None], now)[0].free) > MOVES
     rows = C_v[~is_loop][:, model.tree.joint_columns]
     is_locked = (_largest(rows[:, moving]) <= MOVES) & (_largest(rows) > MOVES)
     return int(np.count_nonzero(is_locked)), _joints(model, ~moving)
 
 
+def rank_of_redundant_loops(model: Model, q: Array, rows: Indices) -> int | None:
+    """The rank of the loops' constraints in `rows` if straight links, at q (n_q,), rad and m, make some redundant.
+
+    Else None. Bent links raise it: joints seem to be locked that the links let move. So does a path by which they bend.
+    """
+    count = int(np.count_nonzero(model.loop_rows[rows]))
+    if not count:
+        return None
+    rank = mobility(model, q).loop_rank
+    return rank - paths_by_bending(model, q)[0] if rank < count else None
+
+
+def shape_in_redundant_loops(model: Model, q: Array, rows: Indices) -> str:
+    """Why links in such loops, straight at q (n_q,), rad and m, cannot be given a shape; "" where there are none."""
+    if rank_of_redundant_loops(model, q, rows) is None:
+        return ""
+    owners = quoted(dict.fromkeys(row.owner for row in model.rows if not row.is_trajectory))
+    return (
+        f"constraints of the loop that {owners} closes are redundant with straight links, and do not hold with bent"
+        ' ones of any shape. Use joints with more degrees of freedom, or kind = "pcid"'
+    )
+
+
 def worst_posture(model: Model, times: Array, q: Array, loop_rank: int = -1) -> tuple[float, int]:
     """Least ratio of `Mobility` at `times` (T,), s, and q (T, n_q), and its time; `loop_rank` as in `mobilities`."""
-    ratios = [at.ratio for at in model.constraints.mobilities(q, times, loop_rank)]
+    ratios = [at.ratio for at in mobilities(model, q, times, loop_rank)]
     return min(ratios), int(np.argmin(ratios))
 
 
@@ -85,7 +126,7 @@ def describe_posture(model: Model, ratio: float, t: float, q: Array, *, is_end: 
     """
     if not ratio < NEARLY_SINGULAR:
         return ""
-    least = np.abs(model.constraints.mobilities(q[None], np.array([t]), loop_rank)[0].hardest)
+    least = np.abs(mobilities(model, q[None], np.array([t]), loop_rank)[0].hardest)
     moving = quoted(_joints(model, least > MOVING * least.max()))
     how = "a singular posture" if is_end else f"nearly a singular posture (ratio {ratio:.1e})"
     return f"at t = {t:.6g} s {how}: motions of {moving} against each other hardly move what follows the path"
@@ -96,7 +137,7 @@ def describe_branches(model: Model, times: Array, q: Array, loop_rank: int) -> s
 
     `loop_rank` as in `mobilities`.
     """
-    ratios = np.array([at.loop_ratio for at in model.constraints.mobilities(q, times, loop_rank)])
+    ratios = np.array([at.loop_ratio for at in mobilities(model, q, times, loop_rank)])
     worst = int(ratios.argmin())
     if not ratios[worst] < BRANCHING or worst in (0, len(times) - 1):
         return ""
@@ -129,7 +170,7 @@ def describe_loops(model: Model, t: float, q: Array, v: Array) -> str:
             ", where forces on the driven point do not determine the direction of motion. Keep clear of it,",
         ),
     ):
-        ratio = of.constraints.ratios(q[None], np.array([t]), rank)[0]
+        ratio = singular_ratios(of, q[None], np.array([t]), rank)[0]
         if ratio < NEARLY_SINGULAR:
             return (
                 f"the configuration is singular or nearly so (ratio of singular values {ratio:.1g}; {what}): a"

@@ -75,8 +75,3 @@ def left_slopes(
                     x[k, :n] -= model.sign(joint) * np.outer(share.direction[of_modes], x[k, row])
                 K[k, :n] -= model.sign(joint) * states.tau[k, row - n] * share.slope[np.ix_(of_modes, of_modes)]
     return M, D, K
-
-
-def joint_places(model: Model) -> Array:
-    """Indices (k,) in q of the coordinates of all joints."""
-    return np.concatenate([np.arange(node.q.start, node.q.stop) for node in model.tree.nodes])

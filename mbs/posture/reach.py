@@ -12,6 +12,7 @@ from ..model.model import MET, Model
 from ..model.nodes import Node
 from ..scene.mechanism import MechanismKeys
 from ..scene.space import SPACES
+from .posture import singular_ratios
 
 TURNING = ("revolute", "universal", "spherical", "weld")
 TRIES = 60
@@ -138,7 +139,7 @@ def regular_postures(model: Model, q: Array) -> Array:
 def are_regular(model: Model, q: Array, times: Array) -> Booleans:
     """(T,) whether joints can follow all rows at `times` (T,), s, in postures q (T, n_q), rad and m."""
     rank = min(len(model.rows), int(model.tree.joint_columns.sum()))
-    return np.asarray(model.constraints.ratios(q, times, rank) > REGULAR)
+    return np.asarray(singular_ratios(model, q, times, rank) > REGULAR)
 
 
 def as_guess(nodes: Sequence[Node], q: Array) -> str:

@@ -5,7 +5,7 @@ joints those that tell the motion left free best then follow it, as joints that 
 links these and the path are followed exactly.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import combinations, pairwise
 
@@ -17,10 +17,10 @@ from ...common.libraries import scipy
 from .. import _core
 from ..fields.waypoints import spline
 from ..model.model import Model
-from ..model.nodes import Node, coordinate_row, rows_of_joint
+from ..model.nodes import ConstraintRow, Node, rows_of_joint
 from ..model.system import driven_mechanism
 from .posture import Mobility, mobility
-from .prescribed import joint_places, prescribed_motion
+from .prescribed import prescribed_motion
 from .start import undeformed_posture
 
 OWNER = "redundancy"  # of the rows that this adds
@@ -52,10 +52,9 @@ def resolved(model: Model, end: float) -> Model:
     q = _least_motion(model, start.q, times)
     if criterion == "least-torque" and end > 0:
         q = _least_torque(model, times, q)
-    nodes = _most_observable(model, q, times, free.freedom - free.followed)
-    if end > 0:
-        return _with_prescribed_joints(model, nodes, times, q)
-    return _with_prescribed_joints(model, nodes, np.array([0.0, 1.0]), np.repeat(q, 2, axis=0), degree=1)
+    nodes = _most_observable(model, times, q, free.freedom - free.followed)
+    rows = _rows(nodes, times, q) if end > 0 else _rows(nodes, np.array([0.0, 1.0]), np.repeat(q, 2, axis=0), degree=1)
+    return replace(model, rows=(*model.rows, *rows))
 
 
 def resolving_joints(model: Model) -> list[str]:
@@ -84,29 +83,30 @@ def _check(model: Model, criterion: str, seen: Mobility) -> None:
             )
 
 
-def _with_prescribed_joints(model: Model, nodes: Sequence[Node], times: Array, q: Array, degree: int = 5) -> Model:
-    """With rows by which the joints of `nodes` follow q (T, n_q) at `times` (T,), a spline between."""
-    values = np.stack([node.sign * q[:, node.q.start] for node in nodes], axis=1)
-    targets = zip(nodes, spline(times, values, degree), strict=True)
-    rows = [coordinate_row(OWNER, node, target, sign=node.sign) for node, target in targets]
-    return replace(model, rows=(*model.rows, *rows))
+def _rows(nodes: Iterable[Node], times: Array, q: Array, degree: int = 5) -> Iterator[ConstraintRow]:
+    """Rows by which the joints of `nodes` follow q (T, n_q) at `times` (T,), a spline between."""
+    for node in nodes:
+        if node.joint.freedoms:
+            sign = node.sign if len(node.joint.units) == 1 else 1.0
+            targets = spline(times, sign * q[:, node.q], degree)
+            yield from rows_of_joint(OWNER, node, np.r_[node.v], targets, sign)
 
 
-def _with_all_joints(model: Model, times: Array, q: Array) -> Model:
-    """With rows by which all joints follow q (T, n_q) at `times` (T,), and none of the path."""
-    rows = [
-        row
-        for node in model.tree.nodes if node.joint.freedoms
-        for row in rows_of_joint(OWNER, node, np.r_[node.v], spline(times, q[:, node.q], 5))
-    ]  # fmt: skip
-    return replace(model, rows=tuple(rows))
+def _left_free(model: Model, times: Array, q: Array) -> list[Array]:
+    """What the rows leave free at `times` (T,) and q (T, n_q): T orthonormal (joints, k), in natural sizes."""
+    return [null_space(C_v, RANK) for C_v in _of_joints(model, times, q)]
+
+
+def _of_joints(model: Model, times: Array, q: Array) -> Array:
+    """C_v (T, rows, joints) at `times` (T,) and q (T, n_q), in natural sizes."""
+    return model.constraints.natural_gradients(q, times)[:, :, model.tree.joint_columns]
 
 
 def _least_motion(model: Model, q: Array, times: Array) -> Array:
     """Q (T, n_q) from q (n_q,) on, with the least v at every time (D. Whitney, IEEE Trans. MMS-10, 1969)."""
     if len(times) == 1:
         return q[None]
-    scales, places, rest = model.joint_sizes, joint_places(model), np.zeros((1, model.tree.n_v))
+    of_joints, rest = model.tree.joint_columns, np.zeros((1, model.tree.n_v))
 
     def ends_at(t: float) -> SolveError:
         return SolveError(
@@ -116,12 +116,12 @@ def _least_motion(model: Model, q: Array, times: Array) -> Array:
 
     def rates(t: float, way: Array) -> Array:
         at, now, q_dot = (q + way)[None], np.array([t]), np.zeros_like(q)
-        C_v = model.constraints.natural_gradients(at, now)[0][:, model.tree.joint_columns]
+        (C_v,) = _of_joints(model, now, at)
         left = model.constraints.rates(at, rest, now)[0] / model.row_sizes
         least = -np.linalg.pinv(C_v, rcond=RANK) @ left
         if np.abs(C_v @ least + left).max() > RANK * np.abs(left).max():
             raise ends_at(t)
-        q_dot[places] = scales[model.tree.joint_columns] * least
+        q_dot[of_joints] = model.joint_sizes[of_joints] * least
         return q_dot
 
     run = scipy.integrate.solve_ivp(
@@ -159,10 +159,10 @@ def _less_torque(model: Model, times: Array, q: Array) -> tuple[Array, float, bo
     end, count, of_joints = float(times[-1]), INTERVALS + 3, model.tree.joint_columns
     knots = np.concatenate([np.zeros(5), np.linspace(0.0, end, INTERVALS + 1), np.full(5, end)])
     basis = scipy.interpolate.BSpline.design_matrix(times, knots, 5).toarray()[:, 2:]
-    places, scales, seen = joint_places(model), model.joint_sizes, slice(None, None, STRIDE)
+    scales, seen = model.joint_sizes, slice(None, None, STRIDE)
     weights = np.sqrt(scipy.integrate.simpson(np.eye(len(times[seen])), x=times[seen]))[:, None] * scales
     still = np.zeros((3, len(weights), int(np.count_nonzero(~of_joints))))
-    free = [null_space(C_v[:, of_joints], RANK) for C_v in model.constraints.natural_gradients(q, times)]
+    free = _left_free(model, times, q)
     for k in range(1, len(free)):  # the least turned from one time to the next
         U, _, V = np.linalg.svd(free[k].T @ free[k - 1])
         free[k] = free[k] @ U @ V
@@ -170,12 +170,12 @@ def _less_torque(model: Model, times: Array, q: Array) -> tuple[Array, float, bo
 
     def moved(shares: Array, at: slice) -> tuple[Array, Booleans]:
         best = q[at].copy()
-        best[:, places] += np.einsum("tjk,tk->tj", ways[at], basis[at] @ shares.reshape(count, -1))
+        best[:, of_joints] += np.einsum("tjk,tk->tj", ways[at], basis[at] @ shares.reshape(count, -1))
         return model.constraints.postures(best, times[at])
 
     def moments(c: Array) -> Array:
         best, is_met = moved(c - 1.0, seen)
-        driven = _with_all_joints(model, times[seen], best)
+        driven = replace(model, rows=tuple(_rows(model.tree.nodes, times[seen], best)))
         mechanism = _core.SpatialPrescribedMotion(driven_mechanism(driven, has_motors=False), best[0])
         motion = prescribed_motion(driven, mechanism, still, times[seen], best)
         return (weights * motion.required).ravel() / size if is_met.all() else np.full(weights.size, OUT_OF_REACH)
@@ -189,20 +189,18 @@ def _less_torque(model: Model, times: Array, q: Array) -> tuple[Array, float, bo
     return moved(best.x - 1.0, slice(None))[0], 2.0 * best.cost * size**2, best.success
 
 
-def _most_observable(model: Model, q: Array, times: Array, count: int) -> tuple[Node, ...]:
+def _most_observable(model: Model, times: Array, q: Array, count: int) -> tuple[Node, ...]:
     """The `count` joints with one coordinate whose share in the motion left free is never small at q (T, n_q).
 
     Nor does it change its sign, between outputs either: there the joint turns back, and tells two motions.
 
     Raises `SolveError` where no such joints tell it all along the path.
     """
-    scales = model.joint_sizes
-    joints = np.eye(len(scales))[:, scales > 0]
-    free = [joints @ null_space(C_v @ joints, RANK) for C_v in model.constraints.natural_gradients(q, times)]
+    free, number = _left_free(model, times, q), np.cumsum(model.tree.joint_columns) - 1
     single = [node for node in model.tree.nodes if len(node.joint.units) == 1]
     best: tuple[float, tuple[Node, ...]] = (0.0, ())
     for nodes in combinations(single, count):
-        columns = [node.v.start for node in nodes]
+        columns = number[[node.v.start for node in nodes]]
         share = min(
             float(np.linalg.svd(N[columns], compute_uv=False)[-1]) if N.shape[1] == count else 0.0 for N in free
         )

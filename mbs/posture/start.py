@@ -6,12 +6,11 @@ from typing import Literal
 
 import numpy as np
 
-from ...common.arrays import Array, Booleans, Indices
+from ...common.arrays import Array, Booleans
 from ...common.errors import InputError, quoted
 from ..model.known_motion import State, mass_matrices
 from ..model.model import Model
 from ..scene.bodies import ROUND_OFF, tensor
-from .posture import mobility, paths_by_bending
 from .reach import posture_from_elsewhere
 
 LEAST = 1e-13  # of inertia, relative
@@ -34,19 +33,28 @@ def undeformed_posture(model: Model) -> State:
     q = posture_from_elsewhere(model, guess) if q is None else q
     rates, named = _guessed_rates(model), _named(model, "joint_rates") | behind
     asked = _with_gears_as_asked(model, State(q, rates)).v if behind.any() else rates
-    v = model.constraints.velocities(q, rates)
+    v = rates_on_rows(model, q, rates)
     if named.any():
-        kept = model.constraints.velocities(q, model.constraints.velocities(q, asked, locked=named))
+        kept = rates_on_rows(model, q, rates_on_rows(model, q, asked, locked=named))
         v = kept if np.allclose(kept[named], asked[named], atol=SAME * np.abs(asked[named]).max()) else v
     start = State(q, v)
     return _twisted_gears(model, start, relaxed_gears(model, start))
+
+
+def rates_on_rows(model: Model, q: Array, v: Array, locked: Booleans | None = None) -> Array:
+    """Return v (n_v,) moved onto Ċ = 0 at q (n_q,) and t = 0 by the least change of joints not `locked` (n_v,)."""
+    scales, now = model.joint_sizes if locked is None else np.where(locked, 0.0, model.joint_sizes), np.zeros(1)
+    (C_v,), (C_dot,) = model.constraints.values(q[None], now)[1], model.constraints.rates(q[None], v[None], now)
+    sizes = model.row_sizes
+    moved: Array = v - scales * np.linalg.lstsq(C_v * scales / sizes[:, None], C_dot / sizes, rcond=1e-10)[0]
+    return moved
 
 
 def _with_gears_as_asked(model: Model, guess: State) -> State:
     """The guess with motors on their paths, and joints behind them as [initial] has them, else without a twist."""
     alone = replace(model, rows=tuple(row for row in model.rows if row.is_trajectory))
     q = alone.constraints.posture(guess.q, 0.0)
-    at = guess if q is None else State(q, alone.constraints.velocities(q, guess.v))
+    at = guess if q is None else State(q, rates_on_rows(alone, q, guess.v))
     return _twisted_gears(model, guess, relaxed_gears(model, at))
 
 
@@ -105,29 +113,6 @@ def _named(model: Model, table: Literal["joints", "joint_rates"]) -> Booleans:
         for node in model.tree.nodes:
             named[node.v] = node.joint.name in model.scene.initial.named(table)
     return named
-
-
-def rank_of_redundant_loops(model: Model, q: Array, rows: Indices) -> int | None:
-    """The rank of the loops' constraints in `rows` if straight links, at q (n_q,), rad and m, make some redundant.
-
-    Else None. Bent links raise it: joints seem to be locked that the links let move. So does a path by which they bend.
-    """
-    count = int(np.count_nonzero(model.loop_rows[rows]))
-    if not count:
-        return None
-    rank = mobility(model, q).loop_rank
-    return rank - paths_by_bending(model, q)[0] if rank < count else None
-
-
-def shape_in_redundant_loops(model: Model, q: Array, rows: Indices) -> str:
-    """Why links in such loops, straight at q (n_q,), rad and m, cannot be given a shape; "" where there are none."""
-    if rank_of_redundant_loops(model, q, rows) is None:
-        return ""
-    owners = quoted(dict.fromkeys(row.owner for row in model.rows if not row.is_trajectory))
-    return (
-        f"constraints of the loop that {owners} closes are redundant with straight links, and do not hold with bent"
-        ' ones of any shape. Use joints with more degrees of freedom, or kind = "pcid"'
-    )
 
 
 def displaced_joints(model: Model, start: State, joints: Container[str] | None = None) -> Iterator[str]:

@@ -26,10 +26,10 @@ from ..posture.posture import (
     describe_branches,
     describe_loops,
     describe_posture,
+    rank_of_redundant_loops,
     worst_posture,
 )
 from ..posture.reach import out_of_reach
-from ..posture.start import rank_of_redundant_loops
 from ..scene.analysis import IntegratedAnalysis
 from .integrators import (
     EXPLICIT,

@@ -16,6 +16,7 @@ from ffrobot.mbs import _core
 from ffrobot.mbs.fields.orientations import OrientationLaw
 from ffrobot.mbs.model.nodes import ConstraintRow, Section, coordinate_row
 from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.mbs.posture.posture import mobilities
 
 CLOSE = 1e-12
 GROUND = Section(-1, "", np.eye(3), np.zeros(3))
@@ -196,7 +197,7 @@ def test_mobility_is_that_of_numpys_gradients(seed):
             for e in np.eye(3)[:2]]  # fmt: skip
     model, (q, _), times = replace(model, rows=(*model.rows, *path)), states_of(rng, model), np.array([0.0, 0.2, 0.5])
     scaled = row_values(model, q, times)[1] * model.joint_sizes / model.row_sizes[:, None]
-    for J, at in zip(scaled[:, :, model.tree.joint_columns], model.constraints.mobilities(q, times), strict=True):
+    for J, at in zip(scaled[:, :, model.tree.joint_columns], mobilities(model, q, times), strict=True):
         _, of_loops, V = np.linalg.svd(J[model.loop_rows])
         rank = np.count_nonzero(of_loops > 1e-6 * max(of_loops[0], 1.0))
         free, followed = V[rank:].T, J[~model.loop_rows]
