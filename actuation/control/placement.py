@@ -26,8 +26,8 @@ from ...mbs.fields.field_types import ModeCount, Name, PatchCount, PointReferenc
 from ...mbs.linear.linearisation import LinearEquations
 from ...mbs.model.gears import with_compliance
 from ...mbs.model.system import motor_forces
+from ...mbs.run.gears import supplied_in
 from ...mbs.run.record import Details, Run
-from ...mbs.run.replay import supplied_in
 from ...mbs.scene.analysis import Surroundings
 from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches, link_patches

@@ -16,8 +16,7 @@ from ..actuation.context import ActuatedContext
 from ..actuation.points import forces_at_points
 from ..common.errors import FfrobotError, InputError, SolveError, of_file
 from ..mbs.posture.path_start import path_start
-from ..mbs.posture.reach import turned_guesses
-from ..mbs.posture.start import check_turning
+from ..mbs.posture.start import check_turning, turned_guesses
 from ..mbs.quantities.validity import NOTABLE_STIFFNESS_CHANGE
 from ..mbs.run.record import Run
 from ..mbs.scene.analysis import Analysis

@@ -101,7 +101,7 @@ class LinearEquations:
         force = H.T @ required_forces(self.model, state, np.array([t]))[0]
         along_s = np.zeros(tree.n_v)
         along_s[s] = force
-        core, N = self.system.derivatives(t, q, v, along_s), np.zeros_like(H)
+        core, N = self.system.core.derivatives(self.system.scene, t, q, v, along_s), np.zeros_like(H)
         N[np.setdiff1d(np.arange(tree.n_v), s)] = -determine @ (self.model.row_signs[:, None] * core.rate_q) @ H
         B, B_dot = _bracket(tree.nodes, v), _bracket(tree.nodes, a)[s]
         H_dot = N - H @ B[s] @ H

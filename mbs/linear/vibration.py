@@ -47,7 +47,7 @@ def vibrations_of(model: Model, unconstrained: MultibodySystem, t: float, q: Arr
     """
     still, sizes = np.zeros(model.tree.n_v), model.natural_sizes
     both = np.outer(sizes, sizes)
-    M = np.linalg.inv(unconstrained.derivatives(t, q, still, still).a_f / both)
+    M = np.linalg.inv(unconstrained.core.derivatives(unconstrained.scene, t, q, still, still).a_f / both)
     (C_v,) = model.constraints.natural_gradients(q[None], np.array([t]), sizes)
     K, D = gear_matrices(model.tree, q)
     D += model.along_cut.damping(q)

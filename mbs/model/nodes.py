@@ -59,15 +59,6 @@ class Node:
         return self.joint.turned_around(own) if self.backwards else own
 
 
-def node_at(
-    q: int, v: int, body: Body, joint: JointRecord, inner: Section, outer: Section, *, backwards: bool = False
-) -> Node:
-    """The node whose joint's coordinates begin at q and v, with those of the modes after them."""
-    p_q, p_v, n = q + joint.q_count, v + joint.freedoms, body.n_modes
-    along = {"q": slice(q, p_q), "p_q": slice(p_q, p_q + n), "v": slice(v, p_v), "p_v": slice(p_v, p_v + n)}
-    return Node(body, joint, backwards, inner, outer, **along)
-
-
 def rotor(node: Node) -> tuple[float, float]:
     """Inertia J (kg·m²) of the rotor in the joint that carries a body, 0 without one, and its ratio N."""
     return float(getattr(node.joint, "rotor_inertia", 0.0)), float(getattr(node.joint, "gear_ratio", 1.0))

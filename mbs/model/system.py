@@ -161,15 +161,6 @@ class MultibodySystem:
                     "it second",
                 )
 
-    def derivatives(self, t: float, q: Array, v: Array, supplied: Array) -> _core.Derivatives:
-        """Return derivatives by increments of q, by v and by generalized forces, along v, under the scene's loads.
-
-        Those of accelerations (n_v, n_v), and of the core's rows (rows, n_v), at t (s), q (n_q,) and v (n_v,); rows
-        that depend on others there are left out. `supplied` (n_v,), N·m or N, acts beside loads and friction. Springs
-        in gears are left as they are: see `gear_matrices`.
-        """
-        return self.core.derivatives(self.scene, t, q, v, supplied)
-
     def _follow(self, plane: Plane | None) -> _core.TreeScene:
         """Targets of the rows, and given forces along joints and at points; in the plane where it is given."""
         rows = self.model.rows if plane is None else [self.model.rows[k] for k in plane.followed]

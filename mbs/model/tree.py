@@ -27,7 +27,7 @@ from ..scene.mechanism import MechanismScene
 from ..scene.topology import Topology
 from .body import Body, rigid_body
 from .kinematics import Kinematics, Places
-from .nodes import ConstraintRow, Node, Section, node_at
+from .nodes import ConstraintRow, Node, Section
 
 AXES = np.eye(3)
 AXES.setflags(write=False)
@@ -104,7 +104,7 @@ class KinematicTree:
                 inner, outer = self.sides(joint)
             if backwards:
                 inner, outer = (side._replace(triad=side.triad @ joint.exchanged) for side in (outer, inner))
-            nodes.append(node_at(q, v, body, joint, inner, outer, backwards=backwards))
+            nodes.append(_node_at(q, v, body, joint, inner, outer, backwards=backwards))
             q, v = nodes[-1].p_q.stop, nodes[-1].p_v.stop
         self.nodes = tuple(nodes)
         self.n_q, self.n_v = q, v
@@ -133,7 +133,7 @@ class KinematicTree:
         for joint, label, inner in outputs:
             outer = Section(len(nodes), "", np.eye(3), np.zeros(3))
             body = rigid_body(label, 0.0, np.zeros(3), np.zeros((3, 3)), {})
-            nodes.append(node_at(tree.n_q, tree.n_v, body, joint, inner, outer))
+            nodes.append(_node_at(tree.n_q, tree.n_v, body, joint, inner, outer))
             tree.n_q, tree.n_v = tree.n_q + 1, tree.n_v + 1
         tree.nodes = tuple(nodes)
         tree.index = {node.body.name: number for number, node in enumerate(nodes)}
@@ -185,6 +185,15 @@ class KinematicTree:
         if self._known is None or self._known.nodes is not self.nodes:
             self._known = Kinematics.of_points(self.nodes)
         return self._known
+
+
+def _node_at(
+    q: int, v: int, body: Body, joint: JointRecord, inner: Section, outer: Section, *, backwards: bool = False
+) -> Node:
+    """The node whose joint's coordinates begin at q and v, with those of the modes after them."""
+    p_q, p_v, n = q + joint.q_count, v + joint.freedoms, body.n_modes
+    along = {"q": slice(q, p_q), "p_q": slice(p_q, p_q + n), "v": slice(v, p_v), "p_v": slice(p_v, p_v + n)}
+    return Node(body, joint, backwards, inner, outer, **along)
 
 
 class CutCoordinate(NamedTuple):

@@ -26,8 +26,7 @@ from ..model.nodes import Node, Section
 from ..scene.mechanism import Word
 from ..scene.space import SPACES
 from .posture import mobility
-from .reach import as_guess, random_angles, regular_postures, turning_joints
-from .start import undeformed_posture
+from .start import as_guess, random_angles, regular_postures, turning_joints, undeformed_posture
 
 TRIES = 600  # random postures from which Newton looks for others
 SAME = 1e-6  # rad: angles that differ by less

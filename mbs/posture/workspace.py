@@ -17,8 +17,7 @@ from ..model.build import row_of_joint
 from ..model.model import Model
 from ..model.nodes import ConstraintRow
 from .limits import limited_coordinates
-from .reach import are_regular, random_angles, turning_joints
-from .start import undeformed_posture
+from .start import are_regular, random_angles, turning_joints, undeformed_posture
 
 TURN = "turn"  # axis of a grid: of the body of the point about an axis of it
 TOGETHER = 500  # postures that are solved at once

@@ -96,7 +96,8 @@ def _lowest_frequency(model: Model, q: Array, t: float) -> float:
     free = null_space(at.gradient, DEPENDENT)
     if not free.shape[1]:
         return float("nan")
-    mobility = without_rows(model).derivatives(t, q, still, still).a_f
+    without = without_rows(model)
+    mobility = without.core.derivatives(without.scene, t, q, still, still).a_f
     ways = statics.sizes[:, None] * free
     K, M = free.T @ statics.stiffness(q, at) @ free, ways.T @ np.linalg.inv(mobility) @ ways
     K, M, own = (K + K.T) / 2, (M + M.T) / 2, np.abs(K.diagonal())

@@ -29,17 +29,18 @@ from ..posture.posture import (
     rank_of_redundant_loops,
     worst_posture,
 )
-from ..posture.reach import out_of_reach
+from ..posture.start import out_of_reach
 from ..scene.analysis import IntegratedAnalysis
 from .integrators import (
     EXPLICIT,
+    METHODS,
     REPEATED,
     TOO_STIFF,
     Choice,
+    Contender,
     beyond_round_off,
     choose_integrator,
     fastest_friction,
-    integration_controls,
     unmet,
 )
 from .record import Continuation, Run, Statistics
@@ -179,13 +180,26 @@ class _Integration:
         inside = breaks[(breaks > begin + 2 * instant) & (breaks < end - 2 * instant)]
         return np.concatenate([inside - instant, inside + instant])
 
+    @property
+    def controls(self) -> _core.IntegrationControls:
+        """The core's settings of the integration."""
+        analysis, candidates = self.analysis, self.integrator.candidates or (Contender(self.integrator.name),)
+        controls = _core.IntegrationControls(
+            tolerance=analysis.tolerance,
+            max_steps=analysis.max_steps,
+            methods=[(METHODS[one.name], one.cost, one.pace) for one in candidates],
+            spectral_radius=analysis.spectral_radius,
+        )
+        controls.keep_steps, controls.stops = analysis.keep_steps, as_list(self.ends)
+        if analysis.repeat_steps is not None:
+            controls.repeated_steps = as_list(analysis.repeat_steps.ends)
+        return controls
+
     def run(self, start: State, progress: Progress) -> _core.TreeRun:
         """Integrate in the core from `start`, or from where an earlier run has stopped."""
         (core, scene, _), control, continuation = self.system.integrated, self.control, self.continuation
-        controls = integration_controls(self.analysis, self.integrator)
-        controls.stops = as_list(self.ends)
         common: dict[str, Any] = dict(model=core, scene=scene, times=as_list(self.times), q=start.q, v=start.v)
-        common.update(controls=controls, carry_on=progress)
+        common.update(controls=self.controls, carry_on=progress)
         if control is None:
             # Where motors take the place of forces on a path their errors count, too
             is_judged = self.is_followed and self.system.model.motors

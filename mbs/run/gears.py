@@ -19,19 +19,25 @@ from ...common.arrays import Array
 from ...common.errors import InputError, SolveError, quoted
 from ...common.libraries import scipy
 from ..joints.joint import TwistSpring
-from ..model.gears import compliance, elastic_joints, with_compliance
+from ..model.gears import with_compliance
 from ..model.known_motion import KnownStates, States, required_forces, rotor_torques
 from ..model.model import Model
 from ..model.nodes import Node, rotor
-from ..model.system import MotorForces, motor_forces, turning_motors
+from ..model.system import MotorForces, motor_forces, path_forces, turning_motors
 from .record import GearCurve, GearMotion, Run
-from .replay import supplied_in
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline, PPoly
 
 REPEATS = 1e-12  # of what bodies feel of twists: a change that no longer counts
 CONTRACTS = 0.5  # of one change the next one at most, where rotors on outer bodies feel their own twist, or it is noise
+
+
+def supplied_in(run: Run) -> Array:
+    """Return generalized forces (T, n_v), N·m or N, modal ones too, that paths or a prescribed shape require."""
+    if run.required is not None:
+        return run.required
+    return path_forces(run.model, run.time, run.q, run.multipliers)
 
 
 class Supplied(NamedTuple):
@@ -51,23 +57,23 @@ def supplied_through_gears(run: Run) -> Supplied:
 
     Raises `InputError` for such a joint without a motor, or with a load.
     """
-    model, time, wanted, twists = run.model, run.time, supplied_in(run), run.twists
-    felt = np.zeros_like(wanted)
-    elastic = [] if model.tree.gears else elastic_joints(model)
-    if not elastic:
+    model, time, twists = run.model, run.time, run.twists
+    compliant, wanted = with_compliance(model), supplied_in(run)
+    if compliant is model:
         return Supplied(motor_forces(model, run.q, wanted), {})
+    elastic = compliant.tree.gears
     for load in model.scene.load:
-        if any(load.joint == node.joint.name for node in elastic):
+        if any(load.joint == gear.joint.joint.name for gear in elastic):
             raise InputError(
                 f"{model.scene.path}: expected no [[load]] on joints with stiffness in inverse analyses and equilibria",
                 f'one on "{load.joint}"',
             )
-    compliant, torques, known = with_compliance(model), rotor_torques(model, run, time), []
-    for node in elastic:
-        joint, (inertia, N) = node.joint.name, rotor(node)
+    felt, torques, known = np.zeros_like(wanted), rotor_torques(model, run, time), []
+    for gear in elastic:
+        joint, (inertia, N) = gear.joint.joint.name, rotor(gear.motor)
         where = f'{model.scene.path}: joint "{joint}"'
-        spring = GearSpring(*(compliance(node) or (TwistSpring((np.inf,)), 0.0)), inertia * N**2, where)
-        known.append((joint, spring, N * torques[:, model.tree.index[node.body.name]], _along(node, run)))
+        spring = GearSpring(gear.spring, gear.damping, inertia * N**2, where)
+        known.append((joint, spring, N * torques[:, model.tree.index[gear.joint.body.name]], _along(gear.joint, run)))
     rigid = required_forces(compliant, _in_motor_coordinates(compliant, run, None), time)
     is_found, change = bool(twists) and all(of.torque is not None for of in twists.values()), np.inf
     for passes in count(1):
@@ -80,14 +86,14 @@ def supplied_through_gears(run: Run) -> Supplied:
             break
         needed = required_forces(compliant, _in_motor_coordinates(compliant, run, gears), time) - rigid
         before, felt = felt, needed[:, : felt.shape[1]]
-        for gear in compliant.tree.gears:  # but for what their springs do along their own joints
+        for gear in elastic:  # but for what their springs do along their own joints
             of = gears[gear.joint.joint.name].twist
             felt[:, gear.joint.v.start] += gear.sign * (gear.spring.moment(of[:, 0]) + gear.damping * of[:, 1])
         change, last = float(np.abs(felt - before).max(initial=0.0)), change
         repeats = change <= REPEATS * float(np.abs(felt).max(initial=0.0))
         if repeats or (passes > len(elastic) and change > CONTRACTS * last):
             break
-    moments = {**forces.moments, **{joint: gear.moment[:, None] for joint, gear in gears.items()}}
+    moments = {**forces.moments, **{joint: of.moment[:, None] for joint, of in gears.items()}}
     return Supplied(replace(forces, moments=moments), gears)
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, as_list
+from ...common.arrays import Array
 from .. import _core
 from ..linear.vibration import Vibrations, vibrations_of, without_rows
 from ..model.gears import tree_resistance_slope
@@ -158,20 +158,6 @@ def faster_of(
     return Choice(first.name, reason, (first, second))
 
 
-def integration_controls(analysis: IntegratedAnalysis, choice: Choice) -> _core.IntegrationControls:
-    """Return the core's integration settings of an analysis."""
-    candidates = choice.candidates or (Contender(choice.name),)
-    methods = [(METHODS[one.name], one.cost, one.pace) for one in candidates]
-    tolerance, radius = analysis.tolerance, analysis.spectral_radius
-    controls = _core.IntegrationControls(
-        tolerance=tolerance, max_steps=analysis.max_steps, methods=methods, spectral_radius=radius
-    )
-    controls.keep_steps = analysis.keep_steps
-    if analysis.repeat_steps is not None:
-        controls.repeated_steps = as_list(analysis.repeat_steps.ends)
-    return controls
-
-
 def beyond_round_off(tolerance: float, run: _core.TreeRun, of_gears: float) -> str:
     """A sentence where round-off of `run`, and of its gears, needs a larger tolerance; else "".
 
@@ -286,7 +272,7 @@ def fastest_friction(system: MultibodySystem, at: State) -> tuple[float, str]:
     D = np.diag(tree_resistance_slope(model.tree, nothing[None])[0]) + model.along_cut.damping(at.q)
     if not D.any():
         return 0.0, ""
-    by_forces = system.derivatives(0.0, at.q, at.v, nothing).a_f
+    by_forces = system.core.derivatives(system.scene, 0.0, at.q, at.v, nothing).a_f
     rates, shapes = np.linalg.eig(by_forces @ D)
     fastest = int(np.argmax(rates.real))
     share = np.abs(shapes[:, fastest])

@@ -18,7 +18,7 @@ from ..fields.waypoints import spline
 from ..model.model import Model
 from ..model.nodes import ConstraintRow
 from ..model.projection import EXACT
-from ..model.system import MultibodySystem, driven_mechanism, frames_in_core, integrated_mechanism, path_forces
+from ..model.system import MultibodySystem, driven_mechanism, frames_in_core, integrated_mechanism
 from ..scene.analysis import TimedAnalysis, output_times
 from ..scene.loads import OF_POINT
 from .context import PatchedLink, PointsOfBody
@@ -149,13 +149,6 @@ def _found(run: Run, reader: Reader, system: MultibodySystem | None = None) -> _
     equations, shape, near, *_ = run.prescribed
     motion = equations()
     return _core.prescribed_forces(motion, shape, near, reader(motion.driven))
-
-
-def supplied_in(run: Run) -> Array:
-    """Return generalized forces (T, n_v), N·m or N, modal ones too, that paths or a prescribed shape require."""
-    if run.required is not None:
-        return run.required
-    return path_forces(run.model, run.time, run.q, run.multipliers)
 
 
 def left_paths(source: Run, run: Run) -> Iterator[str]:

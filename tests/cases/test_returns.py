@@ -18,7 +18,7 @@ from ffrobot.mbs.fields.field_types import Steps
 from ffrobot.mbs.model.system import MultibodySystem, motor_commands, motor_forces
 from ffrobot.mbs.posture.path_start import path_start
 from ffrobot.mbs.run.context import Context
-from ffrobot.mbs.run.replay import supplied_in
+from ffrobot.mbs.run.gears import supplied_in
 from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
 

@@ -110,7 +110,7 @@ def test_derivatives(number):
         scene = system.scene
         for direction in np.eye(tree.n_v):
             scene.add_load(direction, _core.TimeFunction.constant(float(force @ direction)))
-        found = system.derivatives(NOW, q, v, np.zeros(tree.n_v))
+        found = system.core.derivatives(system.scene, NOW, q, v, np.zeros(tree.n_v))
 
         def a(q, v, of=(system.core, scene)):
             states = np.concatenate([q, v])[None]

@@ -85,13 +85,14 @@ def test_derivatives_with_a_force_of_the_motion(joint):
     function = StateFunction.compiled(ctypes.cast(compiled, ctypes.c_void_p).value, is_planar=False)
     load = Load(point=f"{body.name}.{list(body.points)[-1]}", force=function)
     system = MultibodySystem(replace(model, scene=model.scene.model_copy(update={"load": (load,)})))
-    found, n = system.derivatives(t, q, v, np.zeros(model.tree.n_v)), model.tree.n_v
+    found, n = system.core.derivatives(system.scene, t, q, v, np.zeros(model.tree.n_v)), model.tree.n_v
 
     def a(dq=0.0, dv=0.0):
         states = np.concatenate([model.tree.integrate(q, np.zeros(n) + dq), v + dv])[None]
         return _core.tree_outputs(system.core, system.scene, [t], states, None).accelerations[0]
 
-    without = MultibodySystem(model).derivatives(t, q, v, np.zeros(n))
+    without = MultibodySystem(model)
+    without = without.core.derivatives(without.scene, t, q, v, np.zeros(n))
     for key, by in (("a_q", "dq"), ("a_v", "dv")):
         expected = differences(lambda x, by=by: a(**{by: x}), n, 1e-4)
         difference = getattr(found, key) - expected
@@ -110,7 +111,7 @@ def test_the_motion_itself_is_one_of_the_motions_beside_it(joint, loops):
     linearisation = LinearEquations(motion.model, q)
     found = linearisation.at(0.0, q, v, a)
     s = linearisation.independent
-    core = system.derivatives(0.0, q, v, np.zeros(motion.model.tree.n_v))
+    core = system.core.derivatives(system.scene, 0.0, q, v, np.zeros(motion.model.tree.n_v))
     signs = found.transformation[s].diagonal()
     jerk = signs * (core.a_q @ v + core.a_v @ a)[s]
     terms = [found.M @ jerk, found.D @ (signs * a[s]), found.K @ (signs * v[s])]
