@@ -212,13 +212,12 @@ def test_results_that_lack_something(results, members, tmp_path, command):
     assert refused or command not in ("feasibility", "linear")
 
 
-@pytest.mark.parametrize("of", ["motor", "unsupplied", "metrics", "layers"])
+@pytest.mark.parametrize("of", ["motor", "unsupplied", "layers"])
 def test_records_that_lack_a_field(tmp_path, of):
     """Each that is read from results: a message with what is missing, and no program fault."""
     from ffrobot.common.hdf5 import blaming
-    from ffrobot.results.actuators import read_motors, read_unsupplied
     from ffrobot.results.file import Results
-    from ffrobot.results.kinds import read_metrics
+    from ffrobot.results.kinds import read_motors, read_unsupplied
 
     path, nothing = tmp_path / "r.h5", np.zeros((1, 1))
     with h5py.File(path, "w") as file:
@@ -233,7 +232,6 @@ def test_records_that_lack_a_field(tmp_path, of):
         read, lacking = {
             "motor": (lambda: read_motors(file, ["A"]), 'attribute "moment"'),
             "unsupplied": (lambda: read_unsupplied(file), 'attribute "bodies"'),
-            "metrics": (lambda: read_metrics({}), '"verdict"'),
             "layers": (lambda: results.stress_recovery("a", "arm"), 'dataset or group "edges"'),
         }[of]
         expected = rf"r\.h5: damaged file, .*: expected the {lacking}, found none"

@@ -16,8 +16,7 @@ from ..common.errors import InputError, did_you_mean
 from ..common.meanings import meaning
 from ..common.peaks import root_mean_square, top_at
 from ..mbs.joints.joints import JOINT_TYPES
-from ..results.datasets import COLUMN
-from ..results.file import Results
+from ..results.file import COLUMN, Results
 from ..results.peaks import MEAN_POWER, RMS_POWER
 from ..results.peaks import POWER as PEAK_POWER
 from ..sweep.runs import by_dots, is_vector

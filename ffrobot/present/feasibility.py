@@ -36,8 +36,8 @@ def feasibility_tables(path: Path, analysis: str | None) -> Group:
 
 
 def _tables(results: Results, name: str) -> Iterator[Table | str]:
-    from ..results.actuators import read_motors, read_unsupplied
     from ..results.joints import labelled_coordinates
+    from ..results.kinds import read_motors, read_unsupplied
 
     group, scene = results.group(name), results.scene
     yield f'analysis "{name}" ({group.attrs["kind"]})'
@@ -174,10 +174,9 @@ def print_motor_choice(path: Path, catalog: Path, analysis: str | None, console:
     with Results(path) as results:
         tasks = {name: dict(joint_tasks(results, name)) for name in results.analyses}
     judged = [name for name, task in tasks.items() if task]
-    wanted = judged if analysis is None else [analysis]
-    if not wanted or not set(wanted) <= set(judged):
-        raise InputError(f"{path}: --analysis: expected an analysis with motors, {quoted(judged)}", analysis)
-    for name in wanted:
+    if not judged or analysis is not None:
+        check_known(analysis or "none", judged, f"{path}: --analysis: expected an analysis with motors, {quoted(judged)}")
+    for name in judged if analysis is None else [analysis]:
         console.print(f'analysis "{name}", motors of {catalog}', soft_wrap=True)
         rows = (row for joint, task in tasks[name].items() for row in _rows(joint, choices(task, motors)))
         print_table(console, COLUMNS, rows)

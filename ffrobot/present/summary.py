@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
-from ..results.verdict import ROUND_OFF, AnalysisVerdict, Verdict, millimeters, number, of_limit
+from ..results.verdict import ROUND_OFF, AnalysisVerdict, Verdict, millimeters, motor_texts
 from .lines import alike, folded
 
 if TYPE_CHECKING:
@@ -92,17 +92,8 @@ def _worst_motors(judged: Sequence[AnalysisVerdict]) -> Iterator[Row]:
 
 
 def _motor(name: str, motor: MotorFeasibility, one: AnalysisVerdict) -> Row:
-    unit = one.units[name]
-    speed = "rad/s" if unit == "N·m" else "m/s"
-    return (
-        name,
-        f"{of_limit(motor.moment, motor.moment_limit)} {unit}",
-        f"{number(motor.rms_moment)} {unit}",
-        f"{of_limit(motor.speed, motor.speed_limit)} {speed}",
-        f"{of_limit(motor.power, motor.power_limit)} W",
-        _percent(motor.factor) if motor.has_limits else "none",
-        one.name,
-    )
+    share = _percent(motor.factor) if motor.has_limits else "none"
+    return name, *motor_texts(motor, one.units[name]), share, one.name
 
 
 def _texts(verdict: Verdict, remarks: Sequence[str]) -> Iterator[str]:

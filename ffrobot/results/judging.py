@@ -13,9 +13,8 @@ from ..common.arrays import Array
 from ..common.peaks import largest, root_mean_square
 from ..mbs.quantities.motion import section_motion
 from ..run.result import AnalysisResult, Solution
-from .actuators import read_motors, read_unsupplied
 from .joints import Coordinates, Scene, labelled_coordinates
-from .kinds import at_rest_in_words, own_results
+from .kinds import at_rest_in_words, own_results, read_motors, read_unsupplied
 from .peaks import POWER, peak_of
 from .verdict import AnalysisVerdict, PatchNeed, Place, Settled, ToolError, Verdict, millimeters, vibrates
 
@@ -26,10 +25,15 @@ SAME = 1e-9  # of a time: what differs by less is round-off
 SAME_TIME = 9  # digits of output times (s) that count
 
 
+def _is_controlled(group: h5py.Group) -> bool:
+    """Whether a controller keeps an analysis on its path."""
+    return bool(group.attrs["kind"] == "closed-loop")
+
+
 def write_off_path(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
     """Write off_path/: distance of a replay from the paths of its actuation, at outputs and between."""
     source, run = str(group.attrs["actuation"]), result.histories.run
-    if source not in solution.analyses or own_results(group).is_controlled or not len(run.time):
+    if source not in solution.analyses or _is_controlled(group) or not len(run.time):
         return
     of, last = group.parent[source], solution.analyses[source].analysis.last_time
     both = (run.time >= of["time"][0]) & (run.time <= of["time"][-1] * (1.0 + SAME))
@@ -46,8 +50,7 @@ def write_off_path(group: h5py.Group, solution: Solution, result: AnalysisResult
 
 def tool_error(group: h5py.Group, scene: Scene, *, feasible: bool | None) -> ToolError:
     """Return the tool error of an analysis; `feasible` is that of its verdict."""
-    own = own_results(group)
-    if own.is_controlled and (about := own.about(group)):
+    if _is_controlled(group) and (about := own_results(group).about(group)):
         return ToolError(controlled=float(about["tip_error_max"]))
     if (replayed := max((most for _, most, _ in off_path(group, scene)), default=None)) is not None:
         return ToolError(open_loop=replayed)
@@ -70,7 +73,7 @@ def off_path(group: h5py.Group, scene: Scene) -> Iterator[tuple[str, float, floa
             yield str(one.attrs["point"]), float(one.attrs["distance"]), float(one.attrs["distance_rms"])
         return
     name = str(group.attrs.get("actuation", ""))  # of an analysis that takes none: empty
-    if not name or own_results(group).is_controlled:
+    if not name or _is_controlled(group):
         return
     if (source := group.parent.get(name)) is not None:
         yield from _apart(group, source, scene)
@@ -106,7 +109,7 @@ def _judge(name: str, group: h5py.Group, scene: Scene) -> AnalysisVerdict:
     motors = _motors(group, coordinates)
     units = {label: coordinate.force_unit for label, (_, coordinate) in coordinates.items()}
     patches = {body: _patches(entry) for body, entry in group.get("feasibility/pzt", {}).items()}
-    own, (answer, feasible) = own_results(group), _answer(group, motors, patches)
+    answer, feasible = _answer(group, motors, patches)
     answer = answer or ", ".join(
         f"{point} off its path by {millimeters(most)} at most, {millimeters(rms)} RMS"
         for point, most, rms in off_path(group, scene)
@@ -126,7 +129,7 @@ def _judge(name: str, group: h5py.Group, scene: Scene) -> AnalysisVerdict:
         tool_error=tool_error(group, scene, feasible=feasible),
         deflection=None if _ended_early(group) else _deflection(group),
         stress=None if _ended_early(group) else _stress(group),
-        margins=own.margins(own.about(group)),
+        margins=_margins(own_results(group).about(group)),
         settled=_settled(group),
         at_rest=at_rest_in_words(group),
         warnings=tuple(map(str, about.get("warnings", ()))),
@@ -201,7 +204,38 @@ def _answer(
         within = " within their limits" if has_limits else ""
         return f"{means}{within} cannot do it: the path needs other forces on the links, see the warning", False
     within = "within the limits that are given" if has_limits else "no limits are given"
-    return f"motors{' and patches' if patches else ''} can do it, {within}{own.least(group) if about else ''}", True
+    return f"motors{' and patches' if patches else ''} can do it, {within}{_least_voltage(group)}", True
+
+
+def _least_voltage(group: h5py.Group) -> str:
+    if "tracking" not in group:
+        return ""
+    about = group["tracking"].attrs
+    off = about.get("without_patches", np.nan)
+    alone = f"; torques alone are off by {1e3 * off:.3g} mm" if np.isfinite(off) else ""
+    limits = [np.ravel(one.attrs["limit"]) for one in group["pzt"].values() if "limit" in one.attrs]
+    is_one = not limits or np.ptp(np.concatenate(limits)) == 0.0
+    is_one &= not any("range" in one.attrs for one in group["pzt"].values())
+    size = f"{about['least_voltage']:.3g} V" if is_one else f"{100 * about['least_share']:.3g} % of limits"
+    if np.isfinite(price := about.get("tolerance_price", np.nan)):
+        less = f" with path_tolerance, {1e-3 * price:.3g} V less per mm of it"
+        size += less if about["least_voltage"] else ": torques alone stay within path_tolerance"
+    return f"; least voltage {size}{alone}"
+
+
+def _margins(about: Mapping[str, Any]) -> str:
+    if "gain_margin" not in about:
+        return ""
+    if about["delay_margin"] == 0.0:
+        return f"margins (linear model): none, spectral radius of the sampled loop {about['spectral_radius']:.6g}"
+    gain, delay = float(about["gain_margin"]), float(about["delay_margin"])
+    if np.isnan(gain):
+        return "margins (linear model): not computed for a delay of so many samples"
+    texts = (
+        f"gains may grow {gain:.3g}-fold" if np.isfinite(gain) else "gains may grow freely",
+        f"the delay by {1e3 * delay:.3g} ms" if np.isfinite(delay) else "the delay by 50 sample times or more",
+    )
+    return f"margins (linear model): {', '.join(texts)}"
 
 
 def _ended_early(group: h5py.Group) -> bool:
@@ -280,9 +314,13 @@ def _advice(
         inversion = 'kind = "motors-only", or ' if from_rest else ""
         tracked = "" if is_compliant else ' with kind = "tracking"'
         yield f"{inversion}patches ([[pzt]]) on the links{tracked}"
-    own = own_results(group)
-    if about := own.about(group):
-        yield from own.advice(about, asked)
+    about = own_results(group).about(group)
+    yield from (texts := [str(text) for text in np.atleast_1d(about.get("advice", ())) if text])
+    if asked and not about.get("is_needed", True):
+        of = "path_tolerance" if about.get("path_tolerance") else "the tolerance, relative to its length"
+        yield f"patches are not needed: torques alone stay on the path within {of}"
+    if not texts and _is_controlled(group) and about and about["verdict"] not in ("stable", "not settled"):
+        yield "smaller gains, a shorter sample_time, or rotor_inertia in the joints"
 
 
 def _is_from_rest_to_rest(group: h5py.Group) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,18 +14,21 @@ from ..common.arrays import Array, ComplexArray
 from ..common.hdf5 import fields_in
 from ..common.meanings import names_of, write_record
 from ..common.structs import struct
-from ..mbs.quantities.motion import body_motion, modal_rates, reported_points
-from .actuators import write_placement, write_tracking
+from ..mbs.quantities.motion import body_motion, joint_motion, modal_rates, reported_points
+from ..mbs.quantities.supply import actuator_forces
 from .verdict import millimeters
 
 if TYPE_CHECKING:  # most scenes have none of these
     from ..actuation.control.linear import LinearModels
     from ..actuation.control.linear_model import LinearModel, SampledController, StateSpace
     from ..actuation.control.loop import LoopRecord
-    from ..actuation.control.metrics import Metrics
+    from ..actuation.control.placement import Placed
+    from ..actuation.feasibility import Unsupplied
+    from ..actuation.motors import MotorFeasibility
     from ..mbs.analysis.operating_points import RobotAtRest
     from ..mbs.inversion.motors_only import AroundPath
     from ..mbs.run.record import Run
+    from ..mbs.tracking.tracking import TrackedPath
 
 MATRICES = names_of("LinearModel")
 NAMES = ("state_names", "input_names", "output_names")
@@ -139,6 +142,62 @@ def write_zero_dynamics(group: h5py.Group, _: Run, around: AroundPath) -> None:
     entry.attrs["minimum_phase"] = is_minimum_phase(linear)
 
 
+def write_placement(group: h5py.Group, _: Run, placed: Placed) -> None:
+    """Write placement/ of an analysis: reach of optimum and evenly spaced patches, and of one patch anywhere."""
+    group, wanted = group.create_group("placement"), placed.wanted
+    group.attrs.update(body=wanted.body, criterion=wanted.criterion, measure=wanted.measure)
+    write_record(group, placed)
+    write_record(group.create_group("best"), placed.best)
+    write_record(group.create_group("even"), placed.even)
+
+
+def write_tracking(group: h5py.Group, run: Run, tracked: TrackedPath) -> None:
+    """Write tracking/ of an analysis: the errors made small, and the effort for it.
+
+    Work (J) and largest power (W) of motors and of patches, what each zero asks for (V), prices of limits.
+    """
+    group = group.create_group("tracking")
+    about = group.attrs
+    write_record(group, tracked)
+    for kind, prices in tracked.prices.items():
+        for name, values in prices.items():
+            if kind in ("voltage", "torque") or values.any():
+                group[f"{kind}_price/{name}"] = values
+    if (bounds := tracked.bounds) is not None:
+        group["bound/voltage"], group["bound/time"] = bounds.voltages, bounds.times
+        group["bound/zero"] = np.stack([bounds.zeros.real, bounds.zeros.imag], axis=1)
+    forces, motors, patches = actuator_forces(run), np.zeros_like(run.time), np.zeros_like(run.time)
+    assert forces is not None
+    for joint, moments in forces.moments.items():
+        of_joint = joint_motion(run, joint)
+        assert of_joint is not None
+        motors = motors + (moments * of_joint[1]).sum(axis=1)
+    for body, F_p in forces.modal.items():
+        patches = patches + (F_p * body_motion(run, body).modal_velocity).sum(axis=1)
+    for name, power in (("motor", motors), ("patch", patches)):
+        about[f"{name}_work"] = float(np.diff(run.time) @ (power[1:] + power[:-1]) / 2)
+        about[f"{name}_power"] = float(np.abs(power).max(initial=0.0))
+
+
+def read_motors(group: h5py.Group, joints: Sequence[str]) -> dict[str, MotorFeasibility]:
+    """Read requirements and limits of motors from feasibility/ of an analysis, in the order of `joints`."""
+    from ..actuation.motors import MotorFeasibility
+
+    about = {name: group["joints"][name].attrs for name in joints if f"joints/{name}" in group}
+    return {name: MotorFeasibility(**fields_in(of, MotorFeasibility)) for name, of in about.items()}
+
+
+def read_unsupplied(group: h5py.Group) -> Unsupplied | None:
+    """Read the forces that neither motors nor patches supply, from feasibility/; None if there are none."""
+    if "unsupplied" not in group:
+        return None
+    from ..actuation.feasibility import Unsupplied
+
+    attributes = fields_in(group["unsupplied"].attrs, Unsupplied).items()
+    about: dict[str, Any] = {key: tuple(value) if np.ndim(value) else value for key, value in attributes}
+    return Unsupplied(**about)
+
+
 def read_controllers(file: h5py.File, analysis: str) -> tuple[SampledController, ...]:
     """The controllers of a loop that has linear ones, at each instant of their schedule."""
     from ..actuation.control.linear_model import SampledController
@@ -224,13 +283,6 @@ def _write_poles(group: h5py.Group, poles: ComplexArray) -> None:
     group["pole"].attrs["columns"] = ["real", "imaginary"]
 
 
-def read_metrics(attributes: Mapping[str, Any]) -> Metrics:
-    """The metrics among the attributes of control/."""
-    from ..actuation.control.metrics import Metrics
-
-    return Metrics(**fields_in(attributes, Metrics))
-
-
 About = Mapping[str, Any]
 
 
@@ -240,54 +292,22 @@ def _nothing(*_: object) -> str:
 
 @struct
 class OwnResults:
-    """Results of one kind of analysis alone. Functions of `About` get the attributes of the group `part`.
+    """Results of one kind of analysis alone.
 
     Attributes:
-        part: name of that group in the group of the analysis; empty without one.
-        is_controlled: whether a controller keeps it on its path.
+        part: name of their group in the group of the analysis; empty without one. Its attribute `advice` is what to
+            try next.
         write: writes the details of a run to the group of its analysis.
-        answer: answer in words, in place of whether motors and patches can do it.
-        least: text after "motors and patches can do it", from the group of the analysis.
-        margins: gain and delay margins in words.
-        advice: what to try next, by whether it is known what motors and patches can do.
+        answer: answer in words by the attributes of `part`, in place of whether motors and patches can do it.
     """
 
     part: str = ""
-    is_controlled: bool = False
     write: Callable[[h5py.Group, Run, Any], object] = _nothing
     answer: Callable[[About], str] = _nothing
-    least: Callable[[h5py.Group], str] = _nothing
-    margins: Callable[[About], str] = _nothing
-    advice: Callable[[About, bool], Iterable[str]] = _nothing
 
     def about(self, group: h5py.Group) -> About:
         """Attributes of `part` of an analysis; none where it has no such part."""
         return group[self.part].attrs if self.part in group else {}
-
-
-def _least_voltage(group: h5py.Group) -> str:
-    about = group["tracking"].attrs
-    off = about.get("without_patches", np.nan)
-    alone = f"; torques alone are off by {1e3 * off:.3g} mm" if np.isfinite(off) else ""
-    limits = [np.ravel(one.attrs["limit"]) for one in group["pzt"].values() if "limit" in one.attrs]
-    is_one = not limits or np.ptp(np.concatenate(limits)) == 0.0
-    is_one &= not any("range" in one.attrs for one in group["pzt"].values())
-    size = f"{about['least_voltage']:.3g} V" if is_one else f"{100 * about['least_share']:.3g} % of limits"
-    if np.isfinite(price := about.get("tolerance_price", np.nan)):
-        less = f" with path_tolerance, {1e-3 * price:.3g} V less per mm of it"
-        size += less if about["least_voltage"] else ": torques alone stay within path_tolerance"
-    return f"; least voltage {size}{alone}"
-
-
-def _needless_patches(about: About, is_judged: bool) -> Iterator[str]:
-    if is_judged and not about.get("is_needed", True):
-        of = "path_tolerance" if about.get("path_tolerance") else "the tolerance, relative to its length"
-        yield f"patches are not needed: torques alone stay on the path within {of}"
-
-
-def _first_gains(about: About, is_judged: bool) -> Iterator[str]:
-    if text := about.get("advice", ""):
-        yield str(text)
 
 
 def _loop_verdict(about: About) -> str:
@@ -299,41 +319,13 @@ def _loop_verdict(about: About) -> str:
     return f"loop {verdict}{alone}: tip off by {most} at most, {rms} RMS{at_limits}"
 
 
-def _loop_margins(about: About) -> str:
-    if "gain_margin" not in about:
-        return ""
-    if about["delay_margin"] == 0.0:
-        return f"margins (linear model): none, spectral radius of the sampled loop {about['spectral_radius']:.6g}"
-    gain, delay = float(about["gain_margin"]), float(about["delay_margin"])
-    if np.isnan(gain):
-        return "margins (linear model): not computed for a delay of so many samples"
-    texts = (
-        f"gains may grow {gain:.3g}-fold" if np.isfinite(gain) else "gains may grow freely",
-        f"the delay by {1e3 * delay:.3g} ms" if np.isfinite(delay) else "the delay by 50 sample times or more",
-    )
-    return f"margins (linear model): {', '.join(texts)}"
-
-
-def _loop_advice(about: About, is_judged: bool) -> Iterator[str]:
-    yield from map(str, texts := about.get("advice", ()))
-    if not len(texts) and about["verdict"] not in ("stable", "not settled"):
-        yield "smaller gains, a shorter sample_time, or rotor_inertia in the joints"
-
-
 OF_KIND: Mapping[str, OwnResults] = {
     "static": OwnResults(write=write_joint_conditions),
-    "linear": OwnResults("linear", write=write_linear, advice=_first_gains),
+    "linear": OwnResults("linear", write_linear),
     "placement": OwnResults(write=write_placement),
     "motors-only": OwnResults(write=write_zero_dynamics),
-    "tracking": OwnResults("tracking", write=write_tracking, least=_least_voltage, advice=_needless_patches),
-    "closed-loop": OwnResults(
-        "control",
-        is_controlled=True,
-        write=write_loop,
-        answer=_loop_verdict,
-        margins=_loop_margins,
-        advice=_loop_advice,
-    ),
+    "tracking": OwnResults("tracking", write_tracking),
+    "closed-loop": OwnResults("control", write_loop, _loop_verdict),
 }
 """Results of single kinds; those that are not here have none of their own."""
 

@@ -12,12 +12,12 @@ from .joints import joint_coordinates
 
 if TYPE_CHECKING:
     from ..common.arrays import Array
-    from .datasets import Datasets
+    from .file import Results
 
 TIME, SAMPLES = "time", "control/time"
 
 
-def labelled(results: Datasets, analysis: str, histories: Sequence[str]) -> Dataset:
+def labelled(results: Results, analysis: str, histories: Sequence[str]) -> Dataset:
     """All `histories` of an analysis, and the samples of a closed loop; see `Results.to_xarray`."""
     names = [name for name in histories if name != TIME]
     if results.has(f"{analysis}/{SAMPLES}"):
@@ -36,7 +36,7 @@ def labelled(results: Datasets, analysis: str, histories: Sequence[str]) -> Data
     )
 
 
-def _add(results: Datasets, analysis: str, name: str, variables: dict[str, Any], coordinates: dict[str, Any]) -> None:
+def _add(results: Results, analysis: str, name: str, variables: dict[str, Any], coordinates: dict[str, Any]) -> None:
     values = results[f"{analysis}/{name}"]
     dimensions = [SAMPLES if name.startswith("control/") and results.has(f"{analysis}/{SAMPLES}") else TIME]
     if values.ndim == 2:
@@ -50,7 +50,7 @@ def _add(results: Datasets, analysis: str, name: str, variables: dict[str, Any],
     variables[name] = (dimensions, values, _about(results, name))
 
 
-def _columns(results: Datasets, analysis: str, name: str, values: Array) -> tuple[str, Sequence[Any]]:
+def _columns(results: Results, analysis: str, name: str, values: Array) -> tuple[str, Sequence[Any]]:
     count, part = values.shape[1], [*name.split("/"), name][1]
     known = meaning(name)
     columns = known.columns if known is not None and known.columns else name
@@ -60,7 +60,7 @@ def _columns(results: Datasets, analysis: str, name: str, values: Array) -> tupl
     return dimension, labels if len(labels) == count else list(range(1, count + 1))
 
 
-def _about(results: Datasets, name: str) -> dict[str, str]:
+def _about(results: Results, name: str) -> dict[str, str]:
     """Unit and meaning; of a joint's datasets those of its kind of coordinate."""
     known = meaning(name)
     if known is None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import h5py
 import numpy as np
 
-from ..common.arrays import Array, Indices, as_floats
+from ..common.arrays import Array, Indices
 from ..common.meanings import matches, meaning
 from ..common.peaks import largest, shares
 from ..mbs.quantities.motion import deflection, joint_motion, reported_points
@@ -102,7 +102,7 @@ def write_peaks(group: h5py.Group, time: Array, histories: Mapping[str, Array], 
     for name, values in histories.items():
         dataset = group.create_dataset(name, data=values[outputs])
         if len(time):
-            columns = as_floats(values.reshape(len(time), -1))
+            columns = values.reshape(len(time), -1)
             columns = np.linalg.norm(columns, axis=1, keepdims=True) if _is_vector(name) else columns
             tops = np.array([largest(time, column) for column in columns.T])
             if matches(name, VOLTAGE):  # cut off at its limit, it has no smooth top there

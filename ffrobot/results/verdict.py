@@ -132,7 +132,10 @@ class AnalysisVerdict:
         if self.feasible is not None:  # of closed loops, a table has them
             interval = " over the path" if self.kind == "motors-only" else ""
             for name, motor in self.motors.items():
-                yield f"  motor of {name}: {_motor(motor, self.units[name], interval)}"
+                peak, rms, speed, power = motor_texts(motor, self.units[name])
+                beyond = 100 * motor.share_beyond
+                share = f"; above a limit for {beyond:.3g} % of the time" if beyond > 0.0 else ""
+                yield f"  motor of {name}: peak {peak}, RMS {rms}{interval}, {speed}, {power}{share}"
         if self.deflection is not None:
             yield f"  largest deflection {_place(millimeters(self.deflection[0]), *self.deflection[1:])}"
         if self.stress is not None:
@@ -194,18 +197,17 @@ class Verdict:
             yield from one.lines()
 
 
-def _motor(motor: MotorFeasibility, unit: str, interval: str) -> str:
-    speed = "rad/s" if unit == "N·m" else "m/s"
-    parts = [
-        f"peak {of_limit(motor.moment, motor.moment_limit)} {unit}, RMS {number(motor.rms_moment)} {unit}{interval}",
-        f"{of_limit(motor.speed, motor.speed_limit)} {speed}",
-        f"{of_limit(motor.power, motor.power_limit)} W",
-    ]
-    share = f"; above a limit for {100 * motor.share_beyond:.3g} % of the time" if motor.share_beyond > 0.0 else ""
-    return ", ".join(parts) + share
+def motor_texts(motor: MotorFeasibility, unit: str) -> tuple[str, str, str, str]:
+    """Peak and RMS of force or torque in `unit`, speed and power as texts, with limits."""
+    return (
+        f"{_of_limit(motor.moment, motor.moment_limit)} {unit}",
+        f"{number(motor.rms_moment)} {unit}",
+        f"{_of_limit(motor.speed, motor.speed_limit)} {'rad/s' if unit == 'N·m' else 'm/s'}",
+        f"{_of_limit(motor.power, motor.power_limit)} W",
+    )
 
 
-def of_limit(peak: float, limit: float) -> str:
+def _of_limit(peak: float, limit: float) -> str:
     """A peak, and the limit where there is one."""
     return number(peak) + (f" of {limit:g}" if np.isfinite(limit) else "")
 

@@ -7,6 +7,7 @@ import os
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import h5py
 import numpy as np
@@ -37,14 +38,19 @@ from ..mbs.quantities.motion import (
 from ..mbs.quantities.stress import BodyStress
 from ..mbs.quantities.supply import actuator_forces, followed_trajectories, gear_motions, motor_motion
 from ..mbs.run.record import Details, Run
+from ..mbs.scene.space import Space
+from ..run.actuation import Actuation
 from ..run.inputs import digest_of_file, named_files, python_files
 from ..run.result import AnalysisResult, Solution
 from ..scene.scene import Scene
-from .actuators import write_feasibility, write_point_forces, write_voltages
 from .file import FORMAT
 from .judging import write_off_path
 from .kinds import own_results
 from .peaks import peaking, write_peaks
+
+if TYPE_CHECKING:  # most scenes have none of these
+    from ..actuation.feasibility import Feasibility
+    from ..actuation.points import PointForces, PointSet
 
 GROUP = "resume"  # in the group of an analysis
 STOPPED = ("interrupted", "too many steps", "not evaluated")
@@ -106,15 +112,14 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
     if wants("points"):
         _write_points(group, result)
     if wants("feasibility") and result.actuation is not None:
-        write_feasibility(group, solution, result.actuation.feasibility)
+        _write_feasibility(group, solution, result.actuation.feasibility)
     for name, effect in ((name, body.structure) for name, body in solution.bodies.items() if body.structure):
         write_record(group.create_group(f"patch_structure/{name}"), effect)
     for point, settled in result.settling.items() if wants("settling") else ():
         write_record(group.create_group(f"settling/{point}"), settled)
     if (left := result.deviations) is not None:
         about = group.create_group("robustness")
-        about.attrs["bandwidth"] = left.bandwidth
-        about.attrs.create("causes", list(left.causes), dtype=h5py.string_dtype())
+        about.attrs.update(bandwidth=left.bandwidth, causes=list(left.causes))
         for lane, values in left.lanes.items():
             about[lane] = values
     if wants("energy", "momentum", "constraint_violation"):
@@ -142,15 +147,69 @@ def _write_forces(group: h5py.Group, solution: Solution, result: AnalysisResult)
         _write_joints(group, solution, result)
     for body, forces in result.point_forces.items() if wants("actuation_points") else ():
         points = group.create_group(f"actuation_points/{body}")
-        write_point_forces(points, solution.points[body], forces, result.run.space)
+        _write_point_forces(points, solution.points[body], forces, result.run.space)
     for body, stress in histories.stresses.items() if wants("stress") else ():
         _write_stress(group.create_group(f"stress/{body}"), stress, histories.outputs)
     if wants("trajectories"):
         _write_paths(group, result)
     if wants("pzt") and result.actuation is not None:
-        write_voltages(group, solution, result.actuation)
+        _write_voltages(group, solution, result.actuation)
     with_peaks = {name: values for name, values in peaking(result) if wants(name)}
     write_peaks(group, histories.run.time, with_peaks, histories.outputs)
+
+
+def _write_voltages(group: h5py.Group, solution: Solution, actuation: Actuation) -> None:
+    """Write pzt/ of an analysis, a group for each layout.
+
+    `pzt/LAYOUT/residual_force` (T, n) is what all patches of the link leave, on the modes of its file.
+    """
+    for body, of_link in solution.patches.items():
+        for name, patches in of_link.arrays.items():
+            entry, unmet = group.create_group(f"pzt/{name}"), actuation.unmet[body]
+            entry["residual"] = actuation.voltages[name].residual
+            write_record(entry, patches)
+            if solution.scene.is_planar:  # modes of the equations
+                entry["residual_force"] = unmet @ solution.bodies[body].spatial.modal_transform
+            else:
+                entry["residual_force"] = unmet
+                entry["residual_force"].attrs["columns"] = list(map(str, solution.links[body].family))
+            entry.attrs["limit"] = patches.limit if np.unique(patches.limit).size > 1 else patches.limit[0]
+            entry.attrs["capacitance"] = patches.layout.capacitance()
+            if np.any(-patches.amplifiers.range[0] != patches.amplifiers.range[1]):
+                entry.attrs["range"] = patches.amplifiers.range
+            entry.attrs.update({"body": body, "bends": patches.layout.bends})
+
+
+def _write_feasibility(group: h5py.Group, solution: Solution, judged: Feasibility) -> None:
+    """Write feasibility/ of an analysis: what is required of each motor and layout, against what they can."""
+    group = group.create_group("feasibility")
+    group.attrs["feasible"] = judged.is_feasible
+    if judged.unsupplied is not None:
+        write_record(group.create_group("unsupplied"), judged.unsupplied)
+    for label, motor in judged.motors.items():
+        write_record(group.create_group(f"joints/{label}"), motor)
+    layouts = {name: array.layout for of_link in solution.patches.values() for name, array in of_link.arrays.items()}
+    for name, patches in judged.patches.items():
+        entry = group.create_group(f"pzt/{name}")
+        write_record(entry, patches)
+        entry.attrs["depoling_field"] = layouts[name].depoling_field or np.inf
+        entry.attrs["strain_limit"] = layouts[name].strain_limit or np.inf
+        write_record(entry.create_group("remedies"), patches.remedies)
+    for joint in solution.scene.motor_joints:
+        for k, unit in enumerate(joint.units):
+            label = joint.name if len(joint.units) == 1 else f"{joint.name} {k + 1}"
+            group[f"joints/{label}"].attrs["unit"] = "N·m" if unit == "rad" else "N"
+
+
+def _write_point_forces(group: h5py.Group, points: PointSet, forces: PointForces, space: Space) -> None:
+    """Write position, direction and residual of the actuation points of a body, in axes of the scene's `space`."""
+    group["residual"] = forces.residual
+    group["residual_force"] = forces.unmet
+    group["position"] = space.along(np.array([point.position for point in points.points]))
+    group["direction"] = space.along(points.direction.T)
+    of_plane = {"x": "axial", "y": "transverse"} if space.is_plane else {}
+    components = [of_plane.get(axis, axis) for axis in points.axes]
+    group.attrs.update(components=components, rank=forces.rank, condition_number=forces.condition_number)
 
 
 def _write_run(group: h5py.Group, outcome: Run) -> None:
