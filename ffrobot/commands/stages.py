@@ -143,7 +143,7 @@ def solve(
 def _tell(solution: Solution, path: Path, remarked: int) -> None:
     """Print the summary, or the details; `remarked`: lines that stand above it."""
     from ..present.console import summary_console, summary_width
-    from ..present.lines import error_budget, named_tables
+    from ..present.lines import error_budget, tables_of
     from ..present.start_postures import chosen_posture
     from ..present.summary import summary_lines
     from ..results.file import Results
@@ -161,6 +161,5 @@ def _tell(solution: Solution, path: Path, remarked: int) -> None:
         accuracy = "; ".join(error_budget(solution))
         lines = summary_lines(results.verdict, notes, accuracy, str(path), summary_width(), remarked)
         click.echo("\n".join(lines))
-        rows = [(name, cells) for name in results.analyses for cells in robustness_cells(results, name)]
-        for table in named_tables("robustness of", rows):
+        for table in tables_of(results, "robustness of", robustness_cells):
             summary_console().print(table)

@@ -10,7 +10,6 @@ from rich.table import Table
 from ..actuation.control.linear import LinearModels
 from ..actuation.control.loop import LoopRecord
 from ..actuation.control.metrics import DEFINITIONS
-from ..actuation.control.placement import Placed
 from ..common.arrays import Array
 from ..mbs.analysis.operating_points import RobotAtRest
 from ..mbs.inversion.motors_only import AroundPath, describe_zeros, is_minimum_phase
@@ -21,9 +20,9 @@ from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.validity import deflection_warning
 from ..mbs.run.record import Details, Run
 from ..results.file import Results
-from ..results.tables import Cells, analysis_cells, loop_cells, settling_cells, voltage_cells, volts
+from ..results.tables import Cells, analysis_cells, loop_cells, placement_cells, settling_cells, voltage_cells
 from ..run.result import AnalysisResult, ModeChoice, Solution
-from .lines import alike, error_budget, folded, integrated, named_tables
+from .lines import alike, error_budget, folded, integrated, named_tables, tables_of
 
 OF_FILE = ("status", "outputs", "rejected")  # of analyses: for the table of a report alone
 
@@ -71,21 +70,17 @@ def _details(solution: Solution) -> dict[str, Details]:
 
 
 def _tables(solution: Solution, results: Results) -> Iterator[Table]:
-    rows = ((name, cells) for name in results.analyses for cells in voltage_cells(results, name))
-    yield from named_tables("voltages of", rows)
-    rows = ((name, cells) for name in results.analyses for cells in settling_cells(results, name))
-    yield from named_tables("residual vibration", rows)
-    analyses, details = solution.analyses.items(), _details(solution)
-    yield from named_tables("stress in", (row for name, result in analyses for row in _stresses(name, result)))
-    loops = ((name, loop_cells(one.metrics)) for name, one in details.items() if isinstance(one, LoopRecord))
-    yield from named_tables("closed loop", loops)
+    tables = {"voltages of": voltage_cells, "residual vibration": settling_cells, "closed loop": loop_cells}
+    for first, cells_of in (tables | {"placement": placement_cells}).items():
+        yield from tables_of(results, first, cells_of)
+    stresses = (row for name, result in solution.analyses.items() for row in _stresses(name, result))
+    yield from named_tables("stress in", stresses)
     kinds: Mapping[str, tuple[Any, Callable[[str, Any], Rows]]] = {
         "linear model": (LinearModels, _linear),
         "joints": (LinearModels | RobotAtRest, _conditions),
-        "placement": (Placed, _placement),
     }
     for first, (kind, rows_of) in kinds.items():
-        mine = ((name, record) for name, record in details.items() if isinstance(record, kind))
+        mine = ((name, record) for name, record in _details(solution).items() if isinstance(record, kind))
         yield from named_tables(first, (row for name, record in mine for row in rows_of(name, record)))
 
 
@@ -206,29 +201,8 @@ def _stiffness(compliance: Array) -> tuple[str, str]:
     return ", ".join(f"{k / 1e3:.4g}" for k in along), f"{least / 1e3:.4g} ({way})"
 
 
-def _placement(name: str, placed: Placed) -> Rows:
-    """The patches found against as many spread evenly: reach of modes, or the largest voltage of the path."""
-    over_path = placed.wanted.criterion == "voltage"
-    pair = placed.largest_voltage if over_path else (placed.best.value, placed.even.value)
-    is_estimate = placed.wanted.criterion == "estimate"
-    best, even = (
-        f"{volts(value)} V" if over_path else f"{-1e6 * value:.4g} µm" if is_estimate else f"{value:.4g}"
-        for value in pair
-    )
-    cells = {
-        "on": placed.wanted.body,
-        "by": {"voltage": "voltage", "estimate": "deviation of the tip"}.get(
-            placed.wanted.criterion, f"{placed.wanted.measure} reach"
-        ),
-        "optimum": best,
-        "evenly spaced": even,
-        "sets tried": f"{placed.sets}" + (" (evolution)" if placed.method == "evolution" else ""),
-    }
-    yield name, cells
-
-
 def _control_lines(details: Mapping[str, Details]) -> Iterator[str]:
-    """Explain closed loops, a line each: columns, damping ratios, zeros, unreached modes, places of patches."""
+    """Explain closed loops, a line each: columns, damping ratios, zeros, unreached modes."""
     loops = {name: record.metrics for name, record in details.items() if isinstance(record, LoopRecord)}
     if loops:
         yield f"closed-loop control: {DEFINITIONS}"
@@ -238,9 +212,6 @@ def _control_lines(details: Mapping[str, Details]) -> Iterator[str]:
     for name, record in details.items():
         if isinstance(record, LinearModels):
             yield from _of_linear(name, record)
-    for name, record in details.items():
-        if isinstance(record, Placed):
-            yield f"{name}: centers at {', '.join(f'{x:.4g}' for x in record.best.centers)} m"
 
 
 def _of_linear(name: str, linear: LinearModels) -> Iterator[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from io import StringIO
 from pathlib import Path
@@ -13,7 +12,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from ..common.arrays import Array, as_floats
+from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.hdf5 import open_checked
 from ..common.meanings import MODAL_BODY, RESULTS, Meaning, meaning
@@ -21,7 +20,7 @@ from ..fe_models.modal_body import Interface, ModalBody
 from ..fe_models.modal_body_file import FORMAT as MODAL_FORMAT
 from ..fe_models.modal_body_file import read_modal_body
 from ..results.file import FORMAT as RESULTS_FORMAT
-from ..results.file import status_in_words
+from ..results.file import Results, status_in_words
 
 if TYPE_CHECKING:
     from ..mesh.inspection import Inspection
@@ -34,13 +33,14 @@ def describe(path: Path) -> str:
     try:
         with open_checked(path) as file:
             kind = file.attrs.get("format")
-            if kind == RESULTS_FORMAT:
-                return _results(file)
     except OSError as error:
         reason = f"not a readable HDF5 file ({error})"
         if not path.is_file():
             reason = "a folder" if path.is_dir() else "no such file"
         raise InputError(f"{path}: expected a modal body file or a results file", reason) from None
+    if kind == RESULTS_FORMAT:
+        with Results(path) as results:
+            return _results(results)
     if kind == MODAL_FORMAT:
         body = read_modal_body(path)
         with open_checked(path) as file:
@@ -51,7 +51,7 @@ def describe(path: Path) -> str:
 
 
 def _modal_body(body: ModalBody) -> str:
-    center = _place(body, as_floats(body.first_moment / body.mass))
+    center = _place(body, body.first_moment / body.mass)
     lines = [
         f"modal body {body.name!r}: {body.kind}, {body.reference_condition} reference condition, {body.length:g} m",
         f"made by ffrobot {body.ffrobot_version} from input {body.input_hash[:12]}",
@@ -104,29 +104,24 @@ def _optional(body: ModalBody) -> Iterator[str]:
         yield f"patches outlined in the mesh, {faces}, {patches.width:g} m wide: {places} m"
 
 
-def _results(file: h5py.File) -> str:
-    lines = [f"results of scene {file.attrs['name']!r}, made by ffrobot {file.attrs['ffrobot_version']}"]
-    for name, body in json.loads(file.attrs["modal_bodies"]).items():
-        lines.append(f"body {name}: {body['path']} (sha256 {body['sha256'][:12]})")
-    headers = "analysis", "kind", "status", "outputs", "up to t (s)", "steps", "evaluations", "wall (s)"
-    analyses = Table(*headers)
-    datasets = Table("dataset", "shape", "unit", "what")
-    for name, group in file.items():
-        time, attributes = group["time"], group.attrs
-        effort = (str(attributes["steps"]), str(attributes["evaluations"]), f"{attributes['wall_seconds']:.3f}")
-        status = status_in_words(attributes)
-        analyses.add_row(name, attributes["kind"], status, f"{len(time)}", f"{time[-1]:g}", *effort)
-        _add_datasets(datasets, group, RESULTS)
-    tables = [analyses, datasets]
-    closed = {name: group["control"].attrs for name, group in file.items() if "control/commands" in group}
-    if closed:
-        from ..results.kinds import read_metrics  # loads the core
-        from ..results.tables import loop_cells  # loads the records of scenes
+def _results(results: Results) -> str:
+    from ..results.tables import loop_cells  # loads the records of scenes
 
-        cells = {name: loop_cells(read_metrics(attributes)) for name, attributes in closed.items()}
+    lines = [f"results of scene {results.name!r}, made by ffrobot {results.ffrobot_version}"]
+    for name, body in results.modal_files.items():
+        lines.append(f"body {name}: {body.path} (sha256 {body.sha256[:12]})")
+    analyses = Table("analysis", "kind", "status", "outputs", "up to t (s)", "steps", "evaluations", "wall (s)")
+    datasets = Table("dataset", "shape", "unit", "what")
+    for name in results.analyses:
+        time, about = results.time(name), results.attributes(name)
+        effort = (str(about["steps"]), str(about["evaluations"]), f"{about['wall_seconds']:.3f}")
+        analyses.add_row(name, about["kind"], status_in_words(about), f"{len(time)}", f"{time[-1]:g}", *effort)
+        _add_datasets(datasets, results.group(name), RESULTS)
+    tables = [analyses, datasets]
+    if cells := {name: row for name in results.analyses for row in loop_cells(results, name)}:
         tables.insert(1, loops := Table("closed loop", *next(iter(cells.values())), box=None, padding=(0, 1, 0, 0)))
-        for name, of_loop in cells.items():
-            loops.add_row(name, *of_loop.values())
+        for name, row in cells.items():
+            loops.add_row(name, *row.values())
     return "\n".join(lines) + "\n" + "".join(map(_rendered, tables))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from ..mbs.quantities.attachment_error import JOLT
@@ -13,6 +13,9 @@ from ..run.result import AnalysisResult, Solution
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
+
+    from ..results.file import Results
+    from ..results.tables import Cells
 
 
 def alike(lines: Iterable[tuple[str, str]]) -> Iterator[str]:
@@ -51,11 +54,16 @@ def plain_table(headers: Iterable[str], rows: Iterable[Iterable[str]], *, names:
     return table
 
 
-def named_tables(first: str, rows: Iterable[tuple[str, Mapping[str, str]]]) -> Iterator[Table]:
+def named_tables(first: str, rows: Iterable[tuple[str, Cells]]) -> Iterator[Table]:
     """Yield a table of named rows (see `results.tables`), the names in the column `first`; none without rows."""
     named = list(rows)
     if named:
         yield plain_table((first, *named[0][1]), ((name, *cells.values()) for name, cells in named))
+
+
+def tables_of(results: Results, first: str, cells_of: Callable[[Results, str], Iterable[Cells]]) -> Iterator[Table]:
+    """Yield a table of the rows of all analyses as `named_tables` does."""
+    return named_tables(first, ((name, cells) for name in results.analyses for cells in cells_of(results, name)))
 
 
 def print_table(console: Console, headers: Iterable[str], rows: Iterable[Iterable[str]]) -> None:

@@ -1,17 +1,11 @@
 """Tables of a results file as terminal and report have them: rows of text by their headings."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .file import Results, status_in_words
 from .verdict import AnalysisVerdict, millimeters, vibrates
-
-if TYPE_CHECKING:
-    from ..actuation.control.metrics import Metrics
 
 Cells = dict[str, str]
 """A row by heading, without the name of the analysis."""
@@ -59,6 +53,26 @@ def voltage_cells(results: Results, analysis: str) -> Iterator[Cells]:
         }
 
 
+def placement_cells(results: Results, analysis: str) -> Iterator[Cells]:
+    """Patches of a placement against as many spread evenly: reach of modes, deviation, or largest voltage of a path."""
+    if not results.has(group := f"{analysis}/placement"):
+        return
+    about, criterion = results.attributes(group), results.attributes(group)["criterion"]
+    pair = np.array([results[f"{group}/{which}/value"] for which in ("best", "even")])
+    texts = [f"{-1e6 * value:.4g} µm" if criterion == "estimate" else f"{value:.4g}" for value in pair]
+    if criterion == "voltage":
+        texts = [f"{volts(value)} V" for value in results[f"{group}/largest_voltage"]]
+    by = {"voltage": "voltage", "estimate": "deviation of the tip"}
+    yield {
+        "on": about["body"],
+        "by": by.get(criterion, f"{about['measure']} reach"),
+        "centers (m)": ", ".join(f"{x:.4g}" for x in results[f"{group}/best/centers"]),
+        "optimum": texts[0],
+        "evenly spaced": texts[1],
+        "sets tried": f"{about['sets']}" + (" (evolution)" if about["method"] == "evolution" else ""),
+    }
+
+
 def robustness_cells(results: Results, analysis: str) -> Iterator[Cells]:
     """Largest distance of the tip from the computed motion by cause, lanes side by side."""
     if not results.has(group := f"{analysis}/robustness"):
@@ -95,18 +109,21 @@ def volts(value: float) -> str:
     return f"{value:.0f}" if value >= 1e3 else f"{value:.3g}"
 
 
-def loop_cells(metrics: Metrics) -> Cells:
-    """Return the table row of a closed loop: errors, settling, effort, saturation."""
-    return {
-        "verdict": metrics.verdict.partition(" ")[0].replace("not", "stable"),  # and settling: "no"
-        "rms (mm)": f"{1e3 * metrics.tip_error_rms:.3g}",
-        "max (mm)": f"{1e3 * metrics.tip_error_max:.3g}",
-        "settling\n(s)": "no" if np.isnan(metrics.settling_time) else f"{metrics.settling_time:.3g}",
-        "overshoot\n(mm)": f"{1e3 * metrics.overshoot:.3g}",
-        "vibration\n(mm)": f"{1e3 * metrics.vibration:.3g}",
-        "final (mm)": f"{1e3 * metrics.residual:.3g}",
-        "work (J)": f"{metrics.motor_work:.3g}",
-        "torque\n(N·m)": f"{metrics.peak_moment:.3g}",
-        "voltage\n(V)": volts(metrics.peak_voltage),
-        "at\nlimits": f"{100 * metrics.saturated:.2g} %",
+def loop_cells(results: Results, analysis: str) -> Iterator[Cells]:
+    """Yield the table row of a closed loop: errors, settling, effort, saturation."""
+    if not results.has(f"{analysis}/control/commands"):
+        return
+    about = results.attributes(f"{analysis}/control")
+    yield {
+        "verdict": about["verdict"].partition(" ")[0].replace("not", "stable"),  # and settling: "no"
+        "rms (mm)": f"{1e3 * about['tip_error_rms']:.3g}",
+        "max (mm)": f"{1e3 * about['tip_error_max']:.3g}",
+        "settling\n(s)": "no" if np.isnan(about["settling_time"]) else f"{about['settling_time']:.3g}",
+        "overshoot\n(mm)": f"{1e3 * about['overshoot']:.3g}",
+        "vibration\n(mm)": f"{1e3 * about['vibration']:.3g}",
+        "final (mm)": f"{1e3 * about['residual']:.3g}",
+        "work (J)": f"{about['motor_work']:.3g}",
+        "torque\n(N·m)": f"{about['peak_moment']:.3g}",
+        "voltage\n(V)": volts(about["peak_voltage"]),
+        "at\nlimits": f"{100 * about['saturated']:.2g} %",
     }

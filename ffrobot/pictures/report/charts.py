@@ -264,13 +264,13 @@ def _path_errors(files: Sequence[Results]) -> dict[str, Chart]:
         for target in targets(run.results, run.analysis) if len(time) > 1 else ():
             name, title = file_name("error", target.trajectory), f"distance of {target.point} from its path"
             chart = charts.setdefault(name, Chart(name, title, "distance (mm)", includes=(0.0, 1e3 * ROUND_OFF)))
-            error = path_error(run, target)
+            error = path_error(run.results, run.analysis, target)
             look = style(len(chart.traces), k) | (_waiting(run) if chart.traces else {})
             chart.add(run.label, time[: len(error)], 1e3 * error, **look)
     return charts
 
 
-def path_error(run: AnalysisRun, target: PointTarget) -> Array:
+def path_error(results: Results, analysis: str, target: PointTarget) -> Array:
     """Return the distance (T,), m, between a point and its target, in the components that the target has."""
-    reached = run.results.data(f"{run.analysis}/points/{target.point}/position")[:, target.columns]
+    reached = results.data(f"{analysis}/points/{target.point}/position")[:, target.columns]
     return np.linalg.norm(reached[: len(target.wanted)] - target.wanted, axis=1)

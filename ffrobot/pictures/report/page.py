@@ -15,9 +15,8 @@ from ...common.peaks import largest
 from ...common.version import VERSION
 from ...mbs.inversion.zero_dynamics import is_unstable
 from ...results.file import Results
-from ...results.joints import joint_coordinates
-from ...results.kinds import read_metrics
-from ...results.tables import Cells, analysis_cells, loop_cells, settling_cells, voltage_cells, volts
+from ...results.joints import labelled_coordinates
+from ...results.tables import Cells, analysis_cells, loop_cells, placement_cells, settling_cells, voltage_cells
 from ...results.verdict import millimeters, number
 from ..figures.shared import bending_points
 from ..motion import targets
@@ -40,56 +39,45 @@ def _of_cells(first: str, cells_of: Callable[[Results, str], Iterable[Cells]], r
     return Table(heading, [(name, *cells.values()) for name, cells in named])
 
 
-def _loops(results: Results, analysis: str) -> Iterator[Cells]:
-    if results.has(f"{analysis}/control/commands"):
-        yield loop_cells(read_metrics(results.attributes(f"{analysis}/control")))
-
-
 def _warnings_table(runs: Sequence[AnalysisRun]) -> Table:
     rows = [(run.label, "warning", text) for run in runs for text in run.results.warnings.get(run.analysis, ())]
     rows += [(run.label, "note", text) for run in runs for text in run.results.notes.get(run.analysis, ())]
     return Table(("analysis", "", "text"), rows)
 
 
-def _bending_table(runs: Sequence[AnalysisRun]) -> Table:
-    columns = {
-        "deflection (% of length)": ("largest_deflection", 100),
-        "rotation (rad)": ("largest_rotation", 1),
-        "foreshortening (mm)": ("foreshortening", 1e3),
-        "change of stiffness (%)": ("stiffness_change", 100),
-        "error of points (% of length)": ("position_error", 100),
-        "of moments (% of peak)": ("relative_error", 100),
-    }
-    rows = []
-    for run in runs:
-        for body in run.results.names(f"{run.analysis}/bodies"):
-            about = run.results.attributes(f"{run.analysis}/bodies/{body}")
-            if "largest_deflection" in about:
-                cells = (f"{float(f'{scale * about[key]:.2g}'):g}" for key, scale in columns.values())
-                rows.append((run.label, body, *cells))
-    return Table(("analysis", "link", *columns), rows)
+BENDING = {
+    "deflection (% of length)": ("largest_deflection", 100),
+    "rotation (rad)": ("largest_rotation", 1),
+    "foreshortening (mm)": ("foreshortening", 1e3),
+    "change of stiffness (%)": ("stiffness_change", 100),
+    "error of points (% of length)": ("position_error", 100),
+    "of moments (% of peak)": ("relative_error", 100),
+}
 
 
-def peaks_table(runs: Sequence[AnalysisRun]) -> Table:
-    """Return a table of the largest absolute values of the most read quantities, in every run."""
-    rows = []
-    for run in runs:
-        results, analysis, peaks = run.results, run.analysis, list[tuple[str, str, float]]()
-        for target in targets(results, analysis):
-            error = path_error(run, target)
-            most, at = largest(results.time(analysis)[: len(error)], error)
-            peaks.append((f"distance of {target.point} from its path", millimeters(most), at))
-        for joint in (keys["name"] for keys in results.scene.get("joint", [])):
-            for coordinate in joint_coordinates(results.scene, joint):
-                if results.has(moment := f"{analysis}/joints/{joint}/moment"):
-                    peak, at = results.peak(moment + coordinate.column)
-                    name = f"motor of joint {joint}{coordinate.label}"
-                    peaks.append((name, f"{number(peak)} {coordinate.force_unit}", at))
-        for point in bending_points(results, analysis):
-            deflection, at = results.peak(f"{analysis}/points/{point}/deflection")
-            peaks.append((f"deflection of {point}", millimeters(deflection), at))
-        rows += [(run.label, what, value, f"{at:.4g}") for what, value, at in peaks]
-    return Table(("analysis", "largest", "value", "at (s)"), rows)
+def _bending(results: Results, analysis: str) -> Iterator[Cells]:
+    for body in results.names(f"{analysis}/bodies"):
+        about = results.attributes(f"{analysis}/bodies/{body}")
+        if "largest_deflection" in about:
+            values = {key: float(f"{scale * about[of]:.2g}") for key, (of, scale) in BENDING.items()}
+            yield {"link": body} | {key: f"{value:g}" for key, value in values.items()}
+
+
+def _peaks(results: Results, analysis: str) -> Iterator[Cells]:
+    """Largest absolute values of the most read quantities."""
+    peaks = list[tuple[str, str, float]]()
+    for target in targets(results, analysis):
+        error = path_error(results, analysis, target)
+        most, at = largest(results.time(analysis)[: len(error)], error)
+        peaks.append((f"distance of {target.point} from its path", millimeters(most), at))
+    for label, (joint, coordinate) in labelled_coordinates(results.scene).items():
+        if results.has(moment := f"{analysis}/joints/{joint}/moment"):
+            peak, at = results.peak(moment + coordinate.column)
+            peaks.append((f"motor of joint {label}", f"{number(peak)} {coordinate.force_unit}", at))
+    for point in bending_points(results, analysis):
+        deflection, at = results.peak(f"{analysis}/points/{point}/deflection")
+        peaks.append((f"deflection of {point}", millimeters(deflection), at))
+    yield from ({"largest": what, "value": value, "at (s)": f"{at:.4g}"} for what, value, at in peaks)
 
 
 def _origins_table(files: Sequence[Results], studies: Sequence[tuple[Path, Study]]) -> Table:
@@ -130,44 +118,29 @@ def _verdict(run: AnalysisRun) -> dict[str, Any]:
     }
 
 
-def _zeros_table(runs: Sequence[AnalysisRun]) -> Table:
-    rows = []
-    for run in runs:
-        group = f"{run.analysis}/zero_dynamics"
-        if run.results.has(group):
-            about, zeros = run.results.attributes(group), run.results[f"{group}/zeros"]
-            kind = "minimum phase" if about["minimum_phase"] else "not minimum phase: stable inversion"
-            if about["minimum_phase"] and is_unstable(zeros @ (1.0, 1.0j)).any():
-                kind += " at rest; what grows on the way does too little to matter"
-            largest, least = zeros[..., 0].max(), abs(zeros[..., 0]).min()
-            rows.append((run.label, kind, f"{about['factor']:.3g}", f"{largest:.4g}", number(least)))
-    quantities = ("share of the vibration in the output", "largest real part (1/s)", "nearest to the axis (1/s)")
-    return Table(("motors only", "zeros along the path", *quantities), rows)
-
-
-def placements_table(runs: Sequence[AnalysisRun]) -> Table:
-    """Return a table of optimum and evenly spaced patch positions of placement analyses."""
-    rows = []
-    for run in runs:
-        group = f"{run.analysis}/placement"
-        if run.results.has(group):
-            about = run.results.attributes(group)
-            reach = (f"{run.results[f'{group}/{which}/value']:.4g}" for which in ("best", "even"))
-            voltages = (f"{volts(volt)} V" for volt in run.results[f"{group}/largest_voltage"])
-            centers = ", ".join(f"{x:.4g}" for x in run.results[f"{group}/best/centers"])
-            pair = voltages if about["criterion"] == "voltage" else reach
-            rows.append((run.label, about["body"], about["criterion"], centers, *pair))
-    return Table(("placement", "on", "by", "centers (m)", "optimum", "evenly spaced"), rows)
+def _zeros(results: Results, analysis: str) -> Iterator[Cells]:
+    if not results.has(group := f"{analysis}/zero_dynamics"):
+        return
+    about, zeros = results.attributes(group), results[f"{group}/zeros"]
+    kind = "minimum phase" if about["minimum_phase"] else "not minimum phase: stable inversion"
+    if about["minimum_phase"] and is_unstable(zeros @ (1.0, 1.0j)).any():
+        kind += " at rest; what grows on the way does too little to matter"
+    yield {
+        "zeros along the path": kind,
+        "share of the vibration in the output": f"{about['factor']:.3g}",
+        "largest real part (1/s)": f"{zeros[..., 0].max():.4g}",
+        "nearest to the axis (1/s)": number(abs(zeros[..., 0]).min()),
+    }
 
 
 TABLES: Mapping[str, Callable[[Sequence[AnalysisRun]], Table]] = {
     "analyses": partial(_of_cells, "analysis", lambda results, name: [analysis_cells(results, results.verdict[name])]),
-    "loops": partial(_of_cells, "closed loop", _loops),
-    "zeros": _zeros_table,
-    "placements": placements_table,
+    "loops": partial(_of_cells, "closed loop", loop_cells),
+    "zeros": partial(_of_cells, "motors only", _zeros),
+    "placements": partial(_of_cells, "placement", placement_cells),
     "warnings": _warnings_table,
-    "bending": _bending_table,
-    "peaks": peaks_table,
+    "bending": partial(_of_cells, "analysis", _bending),
+    "peaks": partial(_of_cells, "analysis", _peaks),
     "voltages": partial(_of_cells, "voltages of", voltage_cells),
     "settling": partial(_of_cells, "residual vibration", settling_cells),
 }
