@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from rich.console import Console
 
-from ..common.arrays import Array, as_floats
+from ..common.arrays import Array
 from ..common.checksum import MARK, sealed
 from ..common.checksum import METHOD as CHECKSUM
 from ..common.files import write_atomically
@@ -44,11 +44,6 @@ UNITS = {
 NOT_IN_TABLE = ("compliance", "response", "robot", "milling_lobes")
 
 
-def torque_share(poses: PoseMap) -> Array:
-    """Return static torque over limit (P, motors) in P poses; NaN without a limit."""
-    return np.abs(poses.values["torque"]) / poses.limits
-
-
 def write_map(poses: PoseMap) -> Path:
     """Write map.h5 and table.csv to the folder of the plan; returns the path of map.h5."""
     plan = poses.plan
@@ -61,7 +56,7 @@ def write_map(poses: PoseMap) -> Path:
         file["status"] = poses.status.reshape(plan.shape)
         file["status"].attrs["meaning"] = list(STATUS)
         file["torque_limit"], file["frequencies"] = poses.limits, plan.frequencies
-        for name, values in {**poses.values, "torque_share": torque_share(poses), "q": poses.q}.items():
+        for name, values in {**poses.values, "q": poses.q}.items():
             file[name] = values.reshape(*plan.shape, *values.shape[1:])
             file[name].attrs["unit"] = UNITS.get(name.rpartition("/")[2], "")
         for condition, (turn, depth) in best_turns(poses).items():
@@ -80,7 +75,7 @@ def _table(poses: PoseMap) -> str:
     grid = np.stack(np.meshgrid(*(axis.values for axis in plan.axes), indexing="ij"), axis=-1)
     names = [axis.name for axis in plan.axes]
     columns = {name: column for name, column in zip(names, grid.reshape(-1, len(names)).T, strict=True)}
-    for name, values in {**poses.values, "torque_share": torque_share(poses)}.items():
+    for name, values in poses.values.items():
         if name.rpartition("/")[2] not in NOT_IN_TABLE:
             columns |= _columns(poses, name, values)
     lines: list[list[object]] = [[*names, "status", *(name for name in columns if name not in names)]]
@@ -113,7 +108,7 @@ def best_turns(poses: PoseMap) -> dict[str, tuple[Array, Array]]:
         depth = np.moveaxis(poses.values[name].reshape(plan.shape), _turn_axis(poses), -1)
         best = np.where(np.isnan(depth), -1.0, depth).argmax(axis=-1)
         largest = np.take_along_axis(depth, best[..., None], axis=-1)[..., 0]
-        turns[name.partition("/")[0]] = as_floats(np.where(np.isnan(largest), np.nan, angles[best])), largest
+        turns[name.partition("/")[0]] = np.where(np.isnan(largest), np.nan, angles[best]), largest
     return turns
 
 
@@ -170,12 +165,12 @@ def quantities(poses: PoseMap) -> dict[str, Quantity]:
     reach = np.nanmax(np.linalg.norm(values["place"], axis=1))
     deflection = 1e3 * _beyond(ROUND_OFF * reach, np.linalg.norm(values["sag"], axis=1))
     table["deflection"] = Quantity("static deflection (mm)", deflection, False)
-    share = torque_share(poses)
+    share = values["torque_share"]
     if np.isfinite(share).any():
-        table["torque"] = Quantity("largest static torque (% of limit)", 100 * _largest(share), False)
+        table["torque"] = Quantity("largest static torque (% of limit)", 100 * np.fmax.reduce(share, axis=1), False)
     elif share.shape[1]:
         title = " or ".join({"rad": "torque (N·m)", "m": "force (N)"}[unit] for unit in dict.fromkeys(poses.units))
-        table["torque"] = Quantity(f"largest static {title}", _largest(np.abs(values["torque"])), False)
+        table["torque"] = Quantity(f"largest static {title}", np.fmax.reduce(np.abs(values["torque"]), axis=1), False)
     manipulability = _beyond(ROUND_OFF * reach ** values["place"].shape[1], values["manipulability"])
     table["manipulability"] = Quantity("manipulability", manipulability, True)
     size = {name: float(np.abs(one.values[np.isfinite(one.values)]).max(initial=0.0)) for name, one in table.items()}
@@ -183,12 +178,7 @@ def quantities(poses: PoseMap) -> dict[str, Quantity]:
 
 
 def _beyond(round_off: float, values: Array) -> Array:
-    return as_floats(np.where(np.abs(values) <= round_off, 0.0, values))
-
-
-def _largest(values: Array) -> Array:
-    known = np.isfinite(values)
-    return as_floats(np.where(known.any(axis=1), np.where(known, values, -np.inf).max(axis=1), np.nan))
+    return np.where(np.abs(values) <= round_off, 0.0, values)
 
 
 def print_map(poses: PoseMap, console: Console) -> None:

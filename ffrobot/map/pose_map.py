@@ -18,7 +18,7 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from ..batch.batch import Batch
-from ..common.arrays import Array, Booleans, Indices, as_floats
+from ..common.arrays import Array, Booleans, Indices
 from ..common.errors import InputError, SolveError, check_known, did_you_mean, quoted
 from ..common.files import check_folder, write_atomically
 from ..common.keys import MOST_RUNS
@@ -124,12 +124,12 @@ class MapPlan:
         """Unit vector (3,) about which the tool turns over the grid."""
         if self.milling is None or TURN not in [axis.name for axis in self.axes]:
             return None
-        return as_floats(np.array(self.milling.axis) / np.linalg.norm(self.milling.axis))
+        return np.array(self.milling.axis) / np.linalg.norm(self.milling.axis)
 
 
 @dataclass(frozen=True)
 class PoseMap:
-    """A map: `values` (P, …) by name, in units of `map_file.UNITS`, NaN where there is no pose; `status` (P,).
+    """A map: `values` (P, …) by name, in units of `map_file.UNITS`, NaN where there is no pose or limit; `status` (P,).
 
     `motors` have the unit "rad" or "m" of their coordinates in `units`, and `limits` (motors,), N·m or N. `q` (P, n_q).
     """
@@ -349,4 +349,5 @@ def _assembled(
         about |= zip(labels, zip(joint.units, (limit.moment for limit in joint.motor_limits), strict=True), strict=True)
     units, moments = zip(*(about[name] for name in names), strict=True)
     limits = np.where(np.isfinite(moments), moments, np.nan)
+    values["torque_share"] = np.abs(values["torque"]) / limits
     return PoseMap(plan, names, units, limits, status, values=values, q=postures.q)

@@ -92,6 +92,18 @@ def moving_bodies(results: Results, analysis: str, frames: Indices) -> list[Movi
     return list(bodies.values())
 
 
+def chosen_frames(results: Results, analysis: str, count: int) -> Indices:
+    """Return at most `count` outputs (T,) equally far apart, one of them moved to the largest deflection."""
+    time = results.time(analysis)
+    frames = np.linspace(0, len(time) - 1, min(len(time), count)).round().astype(np.intp)
+    points = [f"{analysis}/points/{point}/deflection" for point in results.names(f"{analysis}/points")]
+    peaks = [results.peak(name) for name in points if results.has(name)]
+    if peaks and max(peaks)[0] > 0.0:
+        peak = int(np.abs(time - max(peaks)[1]).argmin())
+        frames[np.abs(frames - peak).argmin()] = peak
+    return np.unique(frames)
+
+
 def _moving_body(results: Results, analysis: str, name: str, frames: Indices) -> MovingBody:
     group, points = f"{analysis}/bodies/{name}", f"{analysis}/points"
     position = in_3d(results[f"{group}/position"][frames])

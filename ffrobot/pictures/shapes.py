@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -196,6 +196,12 @@ def coarse_surface(results: Results, body: MovingBody, size: float, limit: int, 
     shape = thickened(surface_shape(results, body, notes), 0.008 * size)
     kept, triangles = coarsened(shape.points, triangles_of(shape.cells), limit)
     return replace(shape, points=shape.points[kept], shapes=shape.shapes[kept], cells=triangles)
+
+
+def numbered_cells(shapes: Sequence[Shape]) -> list[Integers]:
+    """Return the cells of each shape, where points of all follow each other."""
+    first = np.cumsum([0, *(len(shape.points) for shape in shapes[:-1])])
+    return [shape.cells + start for shape, start in zip(shapes, first, strict=True)]
 
 
 def line_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape:

@@ -15,7 +15,7 @@ from ffrobot import solve
 from ffrobot.batch.batch import batch_of
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.map import pose_map
-from ffrobot.map.map_file import print_map, quantities, torque_share, write_map
+from ffrobot.map.map_file import print_map, quantities, write_map
 from ffrobot.map.pose_map import make_map, plan_map
 from ffrobot.mbs.linear.joint_conditions import free_coordinates
 from ffrobot.mbs.linear.poses import PoseEvaluator
@@ -276,7 +276,7 @@ def test_names_with_blanks_and_limits_of_each_coordinate(tmp_path):
     third = 9.81 * 0.2 * np.cos(0.5 + np.linspace(0, 1, 3))
     second = 9.81 * (2.0 * 0.3 + 0.6) * np.cos(0.5) + third
     np.testing.assert_allclose(found.values["torque"].T, [0 * third, -second, -third], atol=1e-9)
-    np.testing.assert_allclose(torque_share(found).T, [0 * third, second / 5.0, third / 3.0], atol=1e-9)
+    np.testing.assert_allclose(found.values["torque_share"].T, [0 * third, second / 5.0, third / 3.0], atol=1e-9)
 
 
 def test_stable_depth_of_cut_is_that_of_the_response(arm, tmp_path):

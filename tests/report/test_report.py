@@ -15,12 +15,11 @@ import ffrobot
 from ffrobot.common.checksum import seal
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.common.version import VERSION
-from ffrobot.pictures.motion import targets
+from ffrobot.pictures.motion import chosen_frames, targets
 from ffrobot.pictures.report import write_report
 from ffrobot.pictures.report.charts import MAX_POINTS, distinct_parts, kept_outputs, runs
 from ffrobot.pictures.report.mechanism import mechanism
-from ffrobot.pictures.report.page import peaks_table
-from ffrobot.pictures.view.view import chosen_frames
+from ffrobot.pictures.report.page import TABLES
 from ffrobot.results.file import Results
 
 
@@ -63,7 +62,7 @@ def test_forward_analyses_are_measured_against_the_path_they_should_follow(resul
 
 
 def test_peaks_are_those_of_the_file(results, two_link):
-    rows = {(analysis, what): (value, at) for analysis, what, value, at in peaks_table(runs([results])).rows}
+    rows = {(analysis, what): (value, at) for analysis, what, value, at in TABLES["peaks"](runs([results])).rows}
     moment = two_link.file["inverse/joints/O/moment"]
     value, at = rows["inverse", "motor of joint O"]
     assert value == f"{moment.attrs['peak']:.4g} N·m"

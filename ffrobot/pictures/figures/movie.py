@@ -27,7 +27,7 @@ from ..motion import (
 )
 from ..movie_file import Frame, MovieOptions, make_movie
 from ..projection import AXIS_LENGTH, COLORS, PLANE, SPACE, TOOL_COLORS, TOOL_LENGTH
-from ..shapes import coarse_surface
+from ..shapes import coarse_surface, numbered_cells
 from .style import directions, lit, literal, normals, projected, style
 
 SIZE, DPI = (8.0, 4.8), 120  # inches; 960 x 576 pixels
@@ -73,13 +73,9 @@ class _Picture:
         self.size = size_of(bodies)
         if scale is None:
             scale = visible_exaggeration(self.size, largest_deflection(bodies))
-        points, triangles, count = [], [], 0
-        for body in bodies:
-            shape = coarse_surface(results, body, self.size, 3000, notes)
-            points.append(shape.placed(scale))
-            triangles.append(shape.cells + count)
-            count += len(shape.points)
-        self.points, self.triangles = np.concatenate(points, axis=1), np.concatenate(triangles)
+        shapes = [coarse_surface(results, body, self.size, 3000, notes) for body in bodies]
+        self.points = np.concatenate([shape.placed(scale) for shape in shapes], axis=1)
+        self.triangles = np.concatenate(numbered_cells(shapes))
         joints, T, reach = joint_markers(results.scene, bodies), len(outputs), AXIS_LENGTH * self.size
         self.joints = np.stack([joint.exaggerated(scale) for joint in joints], 1) if joints else np.zeros((T, 0, 3))
         self.axes_of_joints = _ends(joints, scale, (-reach, reach), T)

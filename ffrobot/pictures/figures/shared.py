@@ -210,17 +210,18 @@ def limit_curves(limits: MotorLimits, speed: float, moment: float) -> Array:
 
     Units are those of `speed` and `moment`, the largest of the data, as far as which curves go that no limit ends.
     """
-    power = limits.power if np.isfinite(limits.power) else 0.0  # without that limit nothing asks for more than the data
-    speed_end = limits.speed if np.isfinite(limits.speed) else MARGIN * max(speed, power / limits.moment, 1e-300)
-    moment_end = limits.moment if np.isfinite(limits.moment) else MARGIN * max(moment, power / speed_end, 1e-300)
-    pieces = []
-    if np.isfinite(limits.moment):
-        pieces.append(np.array([[0.0, limits.moment], [min(speed_end, limits.power / limits.moment), limits.moment]]))
-    if np.isfinite(limits.power) and limits.power / moment_end < speed_end:
-        rates = np.geomspace(limits.power / moment_end, speed_end, POINTS)
-        pieces.append(np.column_stack([rates, limits.power / rates]))
-    if np.isfinite(limits.speed):
-        pieces.append(np.array([[limits.speed, min(moment_end, limits.power / limits.speed)], [limits.speed, 0.0]]))
+    has_moment, has_speed, has_power = np.isfinite([limits.moment, limits.speed, limits.power])
+    if not (has_moment or has_speed or has_power):
+        return np.empty((0, 2))
+    power = limits.power if has_power else 0.0  # without that limit nothing asks for more than the data
+    speed_end = limits.speed if has_speed else MARGIN * max(speed, power / limits.moment, 1e-300)
+    moment_end = limits.moment if has_moment else MARGIN * max(moment, power / speed_end, 1e-300)
+    rates = [speed_end]
+    if 0.0 < power / moment_end < speed_end:
+        rates = np.geomspace(power / moment_end, speed_end, POINTS).tolist()
+    curve = [[0.0, moment_end]] if has_moment else []
+    curve += [[rate, min(moment_end, limits.power / rate)] for rate in rates]
+    curve += [[speed_end, 0.0]] if has_speed else []
     gap = np.full((1, 2), np.nan)
-    signs = [np.array(pair) for pair in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
-    return np.concatenate([np.empty((0, 2)), *(part for sign in signs for p in pieces for part in (sign * p, gap))])
+    signs = ((1, 1), (-1, 1), (-1, -1), (1, -1))
+    return np.concatenate([part for sign in signs for part in (np.multiply(sign, curve), gap)])

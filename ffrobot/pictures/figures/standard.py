@@ -296,7 +296,7 @@ def _linear(results: Results) -> Iterator[FigureRecord]:
 def _responses(results: Results) -> Iterator[FigureRecord]:
     for analysis in results.analyses:
         if results.has(f"{analysis}/linear"):
-            yield from islice(_responses_of(results, analysis), 1, None)
+            yield from _responses_of(results, analysis)
 
 
 def _responses_of(results: Results, analysis: str) -> Iterator[FigureRecord]:

@@ -14,7 +14,7 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path
 from matplotlib.ticker import ScalarFormatter
 
-from ...common.arrays import Array, Integers, as_floats
+from ...common.arrays import Array, Integers
 from ..projection import COLORS, View
 
 SIZE = (3.5, 2.7)  # inches: one column of a journal page
@@ -132,7 +132,7 @@ def normals(points: Array, cells: Integers) -> Array:
     """Return unit normals (c, 3) of triangles or quadrilaterals `cells` (c, v) on points (p, 3); zero without area."""
     first = points[cells[:, 0]]
     areas = np.cross(points[cells[:, 1]] - first, points[cells[:, -1]] - first)
-    return as_floats(areas / np.maximum(np.linalg.norm(areas, axis=1, keepdims=True), 1e-300))
+    return areas / np.maximum(np.linalg.norm(areas, axis=1, keepdims=True), 1e-300)
 
 
 def sides(cells: Integers) -> Integers:

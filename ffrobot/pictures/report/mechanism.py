@@ -14,6 +14,7 @@ from ..figures.shared import file_name
 from ..motion import (
     Marker,
     MovingBody,
+    chosen_frames,
     ground_places,
     joint_markers,
     largest_deflection,
@@ -69,8 +70,7 @@ def mechanism(runs: Sequence[AnalysisRun]) -> tuple[dict[str, Any], list[str]]:
 
 
 def _frames(run: AnalysisRun) -> Indices:
-    outputs = len(run.results.time(run.analysis))
-    return np.unique(np.linspace(0, outputs - 1, min(outputs, 2000)).astype(np.intp))
+    return chosen_frames(run.results, run.analysis, 2000)
 
 
 def _run_data(run: AnalysisRun, bodies: list[MovingBody], size: float, notes: list[str]) -> dict[str, Any]:

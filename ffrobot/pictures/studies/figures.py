@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import Locator, LogLocator, MaxNLocator
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array
 from ..figures.plot import image_of, write_figure
 from ..figures.style import legend, literal, new_axes, style
 from ..projection import COLORS
@@ -61,7 +61,7 @@ def _draw_bars(diagram: Bars) -> Figure:
     axes.set_title(diagram.title, loc="right")  # which has room on the left, above and below the names
     height = 0.8 / count
     for k, series in enumerate(diagram.series):
-        at = as_floats(np.arange(len(labels)) + (k - 0.5 * (count - 1)) * height)
+        at = np.arange(len(labels)) + (k - 0.5 * (count - 1)) * height
         values = [value or 0.0 for value in series.values[:MOST]]
         bars = axes.barh(
             at,

@@ -11,7 +11,7 @@ from typing import Annotated, Literal, NamedTuple, get_args
 import numpy as np
 from pydantic import Field
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array
 from ...common.errors import InputError, quoted
 from ...common.files import write_atomically
 from ...common.validation import Record, validate
@@ -90,7 +90,7 @@ class DesignAxis(Record):
         """Return positions (…) of values (…), in the unit of the axis: 0 at `low` and 1 at `high`."""
         scaled = np.log if self.logarithmic else np.asarray
         low, high = scaled(np.array([self.low, self.high]))
-        return as_floats((scaled(values) - low) / (high - low))
+        return (scaled(values) - low) / (high - low)
 
     @property
     def places(self) -> Array:
@@ -100,7 +100,7 @@ class DesignAxis(Record):
 
 def floats(values: Numbers) -> Array:
     """Return numbers as an array (n,) in their unit, None as NaN."""
-    return as_floats(np.array([np.nan if value is None else value for value in values]))
+    return np.array([np.nan if value is None else value for value in values])
 
 
 def axis_of_response(label: str, values: Numbers, limit: float | None = None, sense: Literal[1, -1] = 1) -> DesignAxis:

@@ -1,6 +1,6 @@
 """What PyVista draws of grids: `main` is a process of its own (`view.draw_pictures`)."""
 
-import json
+import pickle
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,6 +14,7 @@ from vtkmodules.vtkIOHDF import vtkHDFReader
 from ...common.arrays import Array
 from ..projection import AXIS_LENGTH, LINK, SPACE, TOOL_COLORS, TOOL_LENGTH, View
 from ..shapes import drawn_mode
+from .view import Picture
 
 SIZE, MOVIE_SIZE = (1400, 800), (960, 576)  # pixels, at most so wide
 PANEL = (700, 360)  # pixels, of a mode
@@ -42,24 +43,25 @@ BAR = {
 BAR_ROOM = 0.12  # of the height, at the bottom
 CORNER = (0.82, 0.0, 1.0, 0.18)  # of the picture, where the directions are: most robots stand on its left
 LINE, VERTEX = 3, 1  # VTK's numbers of cells
+_, Y, Z = np.eye(3)
 
 
 def main() -> None:
-    """Draw the pictures (`view.Picture`) of the JSON list on the standard input."""
+    """Draw the pictures on the standard input (pickled)."""
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # it tells of every way to OpenGL that it tries
-    for job in json.loads(sys.stdin.buffer.read()):
-        _draw_modes(job) if job["scale"] is None else _draw_motion(job)
+    for picture in pickle.load(sys.stdin.buffer):
+        _draw_modes(picture) if picture.scale is None else _draw_motion(picture, picture.scale)
 
 
-def _draw_motion(job: dict[str, Any]) -> None:
+def _draw_motion(picture: Picture, scale: float) -> None:
     """Bodies where they were, pale, and as exaggerated, colored; the same view and colors in all frames."""
-    name, unit = SHOWN[job["color"]]
+    name, unit = SHOWN[picture.color]
     grids = []  # as it was, and exaggerated with what it is colored by
-    for step in job["steps"]:
-        grid = _read(job["grid"], step)
+    for step in picture.steps:
+        grid = _read(picture.grid, step)
         shown = grid.copy()
-        shown.points = grid.points + (job["scale"] - 1.0) * grid["exaggeration"]
-        values = grid[job["color"]]
+        shown.points = grid.points + (scale - 1.0) * grid["exaggeration"]
+        values = grid[picture.color]
         shown[name] = unit * (np.linalg.norm(values, axis=1) if values.ndim == 2 else values)
         grids.append((grid, shown))
     everything = np.concatenate([shown.points for _, shown in grids])
@@ -71,20 +73,20 @@ def _draw_motion(job: dict[str, Any]) -> None:
     for _, shown in grids:
         shown[name] = np.where(_is_bare(grids, name), np.nan, shown[name])
     size = float(np.ptp(everything, axis=0).max()) or 1.0
-    view = SPACE if job["in_space"] else LINK
-    widest, height = MOVIE_SIZE if job["movie"] else SIZE
+    view = SPACE if picture.in_space else LINK
+    widest, height = MOVIE_SIZE if picture.movie else SIZE
     wide, high, _ = np.ptp(everything @ np.stack(view, axis=1), axis=0)
     needed = (1.0 - BAR_ROOM) * wide / max(high, 1e-9 * wide, 1e-300)
     window = 2 * round(0.5 * min(widest, max(1.1, needed) * height)), height  # no wider than what is seen needs
     for k, (grid, shown) in enumerate(grids):
         plotter = pyvista.Plotter(off_screen=True, window_size=window)
-        if job["scale"] != 1.0 and not job["movie"]:
+        if scale != 1.0 and not picture.movie:
             _add_ghost(plotter, grid)
         _add(plotter, shown, name, limit, ROD * size, bar)
-        depth = 0.0 if job["in_space"] else 1.2 * float(np.ptp(everything[:, 2])) + 3.0 * PIN * size
-        _add_marks(plotter, job, k, size, depth)
-        _finish(plotter, job["title"].format(time=f"{job['times'][k]:.4g}"), everything, view, BAR_ROOM)
-        plotter.screenshot(str(Path(job["path"]) / f"{k:05d}.png") if job["movie"] else job["path"])
+        depth = 0.0 if picture.in_space else 1.2 * float(np.ptp(everything[:, 2])) + 3.0 * PIN * size
+        _add_marks(plotter, picture, k, size, depth)
+        _finish(plotter, picture.titles[k], everything, view, BAR_ROOM)
+        plotter.screenshot(str(Path(picture.path) / f"{k:05d}.png") if picture.movie else picture.path)
         plotter.close()
 
 
@@ -99,21 +101,21 @@ def _is_bare(grids: Sequence[tuple[Any, Any]], name: str) -> Array:
     return largest[owner] == 0.0
 
 
-def _draw_modes(job: dict[str, Any]) -> None:
-    grid = _read(job["grid"], 0)
+def _draw_modes(picture: Picture) -> None:
+    grid = _read(picture.grid, 0)
     names = sorted(name for name in grid.point_data if name.startswith("mode "))[:MODES]
     columns, rows = min(COLUMNS, len(names)), -(-len(names) // COLUMNS)
     plotter = pyvista.Plotter(off_screen=True, shape=(rows, columns), window_size=(PANEL[0] * columns, PANEL[1] * rows))
     for k, name in enumerate(names):
         plotter.subplot(k // columns, k % columns)
-        displacement, size = drawn_mode(grid[name], job["length"])
+        displacement, size = drawn_mode(grid[name], picture.length)
         shown = grid.copy()
         shown.points = grid.points + displacement
         shown["size"] = size
         _add_ghost(plotter, grid)
-        _add(plotter, shown, "size", 1.0, ROD * job["length"], None)
+        _add(plotter, shown, "size", 1.0, ROD * picture.length, None)
         _finish(plotter, name, shown.points, LINK)
-    plotter.screenshot(job["path"])
+    plotter.screenshot(picture.path)
     plotter.close()
 
 
@@ -151,30 +153,32 @@ def _add_ghost(plotter: Any, grid: Any) -> None:
     plotter.add_mesh(edges if edges.n_points else grid, style="wireframe", color=GHOST, line_width=2)
 
 
-def _add_marks(plotter: Any, job: dict[str, Any], k: int, size: float, depth: float) -> None:
+def _add_marks(plotter: Any, picture: Picture, k: int, size: float, depth: float) -> None:
     """Joints with their axes, the axes x, y, z of what follows paths, what stands on the ground.
 
     Joints are balls, or in planar scenes, with a `depth`, pins through the robot.
     """
-    for at, *axes in job["joints"][k]:
+    scale = picture.scale or 1.0
+    for joint in picture.joints:
+        at = joint.exaggerated(scale)[k]
         if depth:
-            _add_bar(plotter, at, (0.0, 0.0, 1.0), PIN * size, depth, METAL)
+            _add_bar(plotter, at, Z, PIN * size, depth, METAL)
         else:
             plotter.add_mesh(pyvista.Sphere(PIN * size, at), color=METAL, smooth_shading=True, ambient=0.3)
-        for axis in axes:
+        for axis in joint.directions[k]:
             _add_bar(plotter, at, axis, AXIS * size, 2.0 * AXIS_LENGTH * size, METAL)
-    for at, *axes in job["tools"][k]:
-        for axis, color in zip(np.array(axes), TOOL_COLORS, strict=True):
-            middle = np.array(at) + 0.5 * TOOL_LENGTH * size * axis
-            _add_bar(plotter, middle.tolist(), axis.tolist(), AXIS * size, TOOL_LENGTH * size, color)
-    up = np.array((0.0, 0.0, 1.0) if job["in_space"] else (0.0, 1.0, 0.0))
-    for at in job["ground"]:
-        foot = (np.array(at) - 0.5 * STAND * size * up).tolist()
+    for tool in picture.tools:
+        for axis, color in zip(tool.directions[k], TOOL_COLORS, strict=False):  # in planar scenes none
+            middle = tool.exaggerated(scale)[k] + 0.5 * TOOL_LENGTH * size * axis
+            _add_bar(plotter, middle, axis, AXIS * size, TOOL_LENGTH * size, color)
+    up = Z if picture.in_space else Y
+    for at in picture.ground:
+        foot = at - 0.5 * STAND * size * up
         stand = pyvista.Cone(foot, up, height=STAND * size, radius=0.5 * STAND * size, resolution=4)
         plotter.add_mesh(stand, color=METAL, ambient=0.3)
 
 
-def _add_bar(plotter: Any, at: list[float], along: Sequence[float], radius: float, length: float, color: str) -> None:
+def _add_bar(plotter: Any, at: Array, along: Array, radius: float, length: float, color: str) -> None:
     bar = pyvista.Cylinder(at, along, radius=radius, height=length)
     plotter.add_mesh(bar, color=color, smooth_shading=True, split_sharp_edges=True, ambient=0.3)
 

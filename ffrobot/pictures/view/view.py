@@ -4,19 +4,19 @@ Grids are VTK's unstructured ones in HDF5, written without VTK (docs.vtk.org, "V
 2.0; ParaView reads it from 5.12 on): cells once, points and their data once for each time step.
 """
 
-import json
+import pickle
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, field, replace
+from dataclasses import field, replace
 from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 
-from ...common.arrays import Array, Indices, Integers, NDArray, as_rows
+from ...common.arrays import Array, Indices, Integers, NDArray
 from ...common.errors import InputError, SolveError, check_known
 from ...common.files import check_folder, write_atomically
 from ...common.hdf5 import image_of, in_memory
@@ -25,9 +25,18 @@ from ...fe_models.modal_body_file import is_modal_body_file, read_modal_body
 from ...mbs.quantities.stress import surface_stress, von_mises
 from ...results.file import Results
 from ..figures.shared import file_name
-from ..motion import Marker, ground_places, joint_markers, moving_bodies, targets, tool_markers, visible_exaggeration
+from ..motion import (
+    Marker,
+    chosen_frames,
+    ground_places,
+    joint_markers,
+    moving_bodies,
+    targets,
+    tool_markers,
+    visible_exaggeration,
+)
 from ..movie_file import Frame, MovieOptions, make_movie
-from ..shapes import body_surface, surface_shape
+from ..shapes import body_surface, numbered_cells, surface_shape
 
 # VTK's number of the cell with so many corners: vertex, line, triangle, quadrilateral.
 CELL_TYPE = {1: 1, 2: 3, 3: 5, 4: 9}
@@ -114,10 +123,9 @@ def results_grid(results: Results, analysis: str, frames: Indices, notes: list[s
         data["von_mises"].append(stress)
     if all(np.isnan(stress).all() for stress in data["von_mises"]):
         del data["von_mises"]
-    first = np.cumsum([0, *(len(shape.points) for shape in shapes[:-1])])
     numbers = [body["name"] for body in results.scene["body"]]
     return Grid(
-        cells=[shape.cells + start for shape, start in zip(shapes, first, strict=True)],
+        cells=numbered_cells(shapes),
         points=np.concatenate([shape.placed() for shape in shapes], axis=1),
         time=results.time(analysis)[frames],
         point_data={name: np.concatenate(parts, axis=1) for name, parts in data.items()},
@@ -128,27 +136,22 @@ def results_grid(results: Results, analysis: str, frames: Indices, notes: list[s
 SECONDS = 300.0  # after which a machine that cannot draw is given up …
 SECONDS_A_FRAME = 5.0  # … and so many more for each picture of a movie
 
-Place = Sequence[float]  # three
-
 
 @struct
 class Picture:
     """A picture to be drawn, or the frames of a movie; SI units."""
 
-    title: str  # above it
+    titles: Sequence[str]  # above it, at each of its steps
     grid: str = ""  # the .vtkhdf file
     path: str = ""  # of the PNG; of a movie, of a folder for one at each step, `00000.png` and so on
     steps: tuple[int, ...] = (0,)  # of the grid's time steps; one, but of a movie
-    times: tuple[float, ...] = (0.0,)  # of these, in s; the title's `{time}`
     scale: float | None = None  # of deflections; None for a modal body, whose modes are drawn
     length: float = 0.0  # of a modal body, in m
     in_space: bool = False  # whether z goes up, as in 3D scenes; y in planar ones
     color: str = "deflection"  # "deflection" or "von_mises"
-    # for each of the steps joints: a place, exaggerated, in m, and the unit vectors of its axes
-    joints: Sequence[Sequence[Sequence[Place]]] = ((),)
-    # likewise sections that follow paths: a place and the unit vectors x, y, z
-    tools: Sequence[Sequence[Sequence[Place]]] = ((),)
-    ground: Sequence[Place] = ()  # where joints sit on the ground, in m
+    joints: Sequence[Marker] = ()  # at each of the steps
+    tools: Sequence[Marker] = ()  # likewise sections that follow paths
+    ground: Array = field(default_factory=lambda: np.zeros((0, 3)))  # (g, 3) where joints sit on the ground, in m
     movie: bool = False  # whether it is one
 
 
@@ -162,13 +165,10 @@ def draw_pictures(pictures: Sequence[Picture]) -> None:
         raise SolveError(
             "pictures need PyVista, which is not installed: pip install pyvista (with 'numpy<2' next to Debian's)"
         )
-    jobs = json.dumps([asdict(picture) for picture in pictures])
     command = [sys.executable, "-c", f"from {__package__}.drawing import main; main()"]
     seconds = SECONDS + SECONDS_A_FRAME * sum(len(picture.steps) for picture in pictures)
     try:
-        done = subprocess.run(
-            command, input=jobs, capture_output=True, text=True, errors="replace", timeout=seconds, encoding="utf-8"
-        )
+        done = subprocess.run(command, input=pickle.dumps(pictures), capture_output=True, timeout=seconds)
     except subprocess.TimeoutExpired:
         raise SolveError(f"PyVista did not finish its pictures within {seconds:g} s") from None
     if done.returncode < 0:
@@ -177,7 +177,7 @@ def draw_pictures(pictures: Sequence[Picture]) -> None:
             "none that works (Debian: apt install libegl1 libgl1-mesa-dri)",
         )
     if done.returncode:
-        reason = (done.stderr.strip().splitlines() or ["no reason given"])[-1]
+        reason = (done.stderr.decode(errors="replace").strip().splitlines() or ["no reason given"])[-1]
         raise SolveError(f"PyVista failed: {reason}")
 
 
@@ -244,7 +244,7 @@ def _modal_body(path: Path) -> Views:
         for k, family in enumerate(body.family)
     }
     grid = Grid([mesh.cells], mesh.points[None], point_data=modes)
-    return [(name, grid, [Picture(body.name, path=f"{name}.png", length=body.length)])]
+    return [(name, grid, [Picture([body.name], path=f"{name}.png", length=body.length)])]
 
 
 def _results(path: Path, options: Options, notes: list[str]) -> Views:
@@ -269,18 +269,6 @@ def _results(path: Path, options: Options, notes: list[str]) -> Views:
             yield name, grid, pictures
 
 
-def chosen_frames(results: Results, analysis: str, count: int) -> Indices:
-    """Return at most `count` outputs (T,) equally far apart, one of them moved to the largest deflection."""
-    time = results.time(analysis)
-    frames = np.linspace(0, len(time) - 1, min(len(time), count)).round().astype(np.intp)
-    points = [f"{analysis}/points/{point}/deflection" for point in results.names(f"{analysis}/points")]
-    peaks = [results.peak(name) for name in points if results.has(name)]
-    if peaks and max(peaks)[0] > 0.0:
-        peak = int(np.abs(time - max(peaks)[1]).argmin())
-        frames[np.abs(frames - peak).argmin()] = peak
-    return np.unique(frames)
-
-
 def _step(grid: Grid, time: float | None, color: str) -> int:
     """That nearest to `time`; without one, that at which what it is colored by is largest."""
     if time is not None and grid.time is not None:
@@ -299,29 +287,18 @@ def _motion(
     if scale is None:
         size = np.ptp(grid.points[some], axis=1).max()
         scale = visible_exaggeration(float(size), np.linalg.norm(grid.point_data["deflection"][some], axis=2).max())
-    name, exaggerated = f"{results.name}: {analysis}", "" if scale == 1.0 else f", deformation x {scale:g}"
-    braces = name.replace("{", "{{").replace("}", "}}")
+    exaggerated = "" if scale == 1.0 else f", deformation x {scale:g}"
     bodies = moving_bodies(results, analysis, frames[some])
-    tools = tool_markers(targets(results, analysis), bodies)
     return Picture(
-        f"{braces}, t = {{time}} s{exaggerated}",
+        [f"{results.name}: {analysis}, t = {time:.4g} s{exaggerated}" for time in grid.time[some]],
         steps=steps,
-        times=tuple(map(float, grid.time[some])),
         scale=scale,
         color=color,
         in_space=not results.space.is_plane,
-        joints=_directed(joint_markers(results.scene, bodies), scale, len(steps)),
-        tools=_directed([tool for tool in tools if tool.directions.size], scale, len(steps)),
-        ground=as_rows(ground_places([results.scene])),
+        joints=joint_markers(results.scene, bodies),
+        tools=tool_markers(targets(results, analysis), bodies),
+        ground=ground_places([results.scene]),
     )
-
-
-def _directed(markers: Sequence[Marker], scale: float, steps: int) -> list[list[list[list[float]]]]:
-    """At each of the steps, of each marker: its place, and its directions."""
-    return [
-        [as_rows(np.stack([marker.exaggerated(scale)[k], *marker.directions[k]])) for marker in markers]
-        for k in range(steps)
-    ]
 
 
 def _draw(pictures: Sequence[Picture], folder: Path) -> list[Path]:
