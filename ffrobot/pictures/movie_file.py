@@ -3,7 +3,7 @@
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from io import BytesIO
 from itertools import chain, repeat
 from pathlib import Path
@@ -40,7 +40,7 @@ def movie_outputs(time: Array, seconds: float) -> Indices:
     return np.asarray(np.searchsorted(time, wanted + reach, side="right") - 1, dtype=np.intp)
 
 
-Draw = Callable[[Results, str, Indices, float | None, list[str]], Iterator[Frame]]
+Draw = Callable[[Results, str, Indices, float | None, list[str]], Iterable[Frame]]
 """A frame for each of some outputs of an analysis, by a scale of deflections, with notes."""
 
 

@@ -122,10 +122,10 @@ def _clustered(points: Array, triangles: Integers, size: Array) -> tuple[Indices
     return kept, mapped[apart][np.sort(first)]
 
 
-def _visual_surface(results: Results, name: str, notes: list[str]) -> tuple[Array, Integers] | None:
-    """Points (p, 3), m, body axes, and triangles (t, 3) of a visual shape; None, with a line in `notes`, if hidden."""
-    body = next(entry for entry in results.scene["body"] if entry["name"] == name)
-    entries = body.get("rigid", {}).get("visual", ())
+def _visual_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape | None:
+    """None without visual shapes, and, with a line in `notes`, where one cannot be drawn."""
+    keys = next(entry for entry in results.scene["body"] if entry["name"] == body.name)
+    entries = keys.get("rigid", {}).get("visual", ())
     if not entries:
         return None
     try:
@@ -136,10 +136,11 @@ def _visual_surface(results: Results, name: str, notes: list[str]) -> tuple[Arra
         notes.append("bodies are drawn without their meshes, which need trimesh: pip install trimesh pycollada")
         return None
     except InputError as error:
-        logger.warning("mesh of %s", name, exc_info=error)
-        notes.append(f"{name} is drawn without its mesh: {shown(str(error))}")
+        logger.warning("mesh of %s", body.name, exc_info=error)
+        notes.append(f"{body.name} is drawn without its mesh: {shown(str(error))}")
         return None
-    return np.array(skin.vertices), np.array(skin.faces)
+    points, no_modes = np.array(skin.vertices), np.zeros((len(body.position), 0))
+    return Shape(body, points, np.zeros((*points.shape, 0)), no_modes, np.array(skin.faces))
 
 
 def _skin(entry: Mapping[str, Any], folder: Path) -> trimesh.Trimesh:
@@ -181,9 +182,8 @@ def surface_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape
 
     `notes` say which files are not found.
     """
-    if body.modal is None and (visual := _visual_surface(results, body.name, notes)) is not None:
-        points, triangles = visual
-        return Shape(body, points, np.zeros((*points.shape, 0)), np.zeros((len(body.position), 0)), triangles)
+    if body.modal is None and (visual := _visual_shape(results, body, notes)) is not None:
+        return visual
     link = _modal_body(results, body, notes)
     if link is None or body.modal is None:
         return point_shape(body)

@@ -13,7 +13,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from io import TextIOWrapper
 from shutil import get_terminal_size
-from types import TracebackType
 from typing import TYPE_CHECKING, TextIO
 
 from ..common.errors import FfrobotError
@@ -70,7 +69,7 @@ class Display(Watcher):
             self._progress.console.show_cursor()  # for a kill leaves it as it is
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
+    def __exit__(self, *error: object) -> None:
         if self._progress:
             self._progress.stop()
 

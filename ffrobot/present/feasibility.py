@@ -175,7 +175,9 @@ def print_motor_choice(path: Path, catalog: Path, analysis: str | None, console:
         tasks = {name: dict(joint_tasks(results, name)) for name in results.analyses}
     judged = [name for name, task in tasks.items() if task]
     if not judged or analysis is not None:
-        check_known(analysis or "none", judged, f"{path}: --analysis: expected an analysis with motors, {quoted(judged)}")
+        check_known(
+            analysis or "none", judged, f"{path}: --analysis: expected an analysis with motors, {quoted(judged)}"
+        )
     for name in judged if analysis is None else [analysis]:
         console.print(f'analysis "{name}", motors of {catalog}', soft_wrap=True)
         rows = (row for joint, task in tasks[name].items() for row in _rows(joint, choices(task, motors)))

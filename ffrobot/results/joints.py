@@ -36,14 +36,9 @@ def joint_type(keys: Mapping[str, Any]) -> type[JointRecord]:
     return JOINT_TYPES[str(keys["type"])]
 
 
-def joint_keys(scene: Scene, name: str) -> Mapping[str, Any]:
-    """Return the table of a joint in the scene; empty without such a joint."""
-    return next((keys for keys in scene.get("joint", []) if keys["name"] == name), {})
-
-
 def joint_coordinates(scene: Scene, name: str) -> tuple[Coordinate, ...]:
     """The coordinates of a joint in the order of its datasets; none of one that does not move, or is not there."""
-    keys = joint_keys(scene, name)
+    keys: Scene = next((keys for keys in scene.get("joint", []) if keys["name"] == name), {})
     units = joint_type(keys).units if keys else ()
     limits = [np.broadcast_to(keys.get(f"{what}_limit") or np.inf, len(units)) for what in ("moment", "speed", "power")]
     several = len(units) > 1

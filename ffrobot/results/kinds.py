@@ -27,6 +27,7 @@ if TYPE_CHECKING:  # most scenes have none of these
     from ..actuation.motors import MotorFeasibility
     from ..mbs.analysis.operating_points import RobotAtRest
     from ..mbs.inversion.motors_only import AroundPath
+    from ..mbs.linear.joint_conditions import RobotModes
     from ..mbs.run.record import Run
     from ..mbs.tracking.tracking import TrackedPath
 
@@ -52,13 +53,11 @@ def write_linear(group: h5py.Group, run: Run, linear: LinearModels) -> None:
         group[key] = np.array([getattr(model, key) for model in models])
     for key in NAMES:
         group.attrs[key] = list(getattr(models[0], key))
-    group["frequency"] = np.array([modes.frequency for modes in linear.modes])
-    group["damping_ratio"] = np.array([modes.damping_ratio for modes in linear.modes])
+    _write_modes(group, run, linear.modes)
     _write_poles(group, np.array([modes.poles.ravel() for modes in linear.modes]))
     for kind, reaches in (("controllability", linear.controllable), ("observability", linear.observable)):
         group[kind] = np.array([reach.measure for reach in reaches])
         group[kind].attrs["lost"] = sorted({name for reach in reaches for name in reach.lost})
-    _write_shapes(group, run, np.array([modes.motion.real for modes in linear.modes]))
     group.attrs["advice"] = linear.advice
     for k, (pair, every) in enumerate(linear.zeros.items(), 1):
         values = np.full((len(every), max(len(zeros.values) for zeros in every), 2), np.nan)
@@ -73,9 +72,7 @@ def write_joint_conditions(group: h5py.Group, run: Run, details: LinearModels | 
     """Write joints_locked/ and joints_compliant/ of an analysis: frequencies, modes, compliance."""
     for condition in details.conditions[0]:
         states, own = [at[condition] for at in details.conditions], group.create_group(f"joints_{condition}")
-        own["frequency"] = np.array([one.modes.frequency for one in states])
-        own["damping_ratio"] = np.array([one.modes.damping_ratio for one in states])
-        _write_shapes(own, run, np.array([one.modes.motion.real for one in states]))
+        _write_modes(own, run, [one.modes for one in states])
         for point in states[0].compliance:
             own[f"compliance/{point}"] = np.array([one.compliance[point] for one in states])
 
@@ -102,9 +99,12 @@ def at_rest_in_words(group: h5py.Group) -> str:
     return "; ".join(texts)
 
 
-def _write_shapes(group: h5py.Group, run: Run, along_v: Array) -> None:
-    """modes/: displacement, turn and modal coordinates of bodies by modes with rates `along_v` (T, f, coordinates)."""
-    along_v = along_v[:, :, : run.model.tree.n_v]  # motors behind gears come last
+def _write_modes(group: h5py.Group, run: Run, modes: Sequence[RobotModes]) -> None:
+    """Frequencies, damping ratios, and modes/: displacement, turn and modal coordinates of bodies."""
+    group["frequency"] = np.array([one.frequency for one in modes])
+    group["damping_ratio"] = np.array([one.damping_ratio for one in modes])
+    # (T, f, n_v) rates by modes; motors behind gears come last
+    along_v = np.array([one.motion.real for one in modes])[:, :, : run.model.tree.n_v]
     T, f, n_v = along_v.shape
     moving = replace(run, time=np.repeat(run.time, f), q=np.repeat(run.q, f, 0), v=along_v.reshape(T * f, n_v))
     space, turning = run.space, "angle" if run.space.is_plane else "rotation"

@@ -12,7 +12,7 @@ from ...results.file import Results
 from ..motion import ground_places, largest_deflection, moving_bodies, size_of, visible_exaggeration
 from ..projection import COLORS, FRONT, PLANE, SIDE, SPACE
 from ..shapes import Shape, line_shape, surface_shape
-from .shared import FigureRecord
+from .shared import FigureRecord, check_part
 from .style import SIZE, SceneAxes, legend, line_style, new_axes, shades
 
 SIZE_3D = (2 * SIZE[0], 1.6 * SIZE[1])  # inches
@@ -179,7 +179,6 @@ def _way(results: Results, group: str, shape: Shape, k: int, mode: int) -> Array
 
 def _nearest(results: Results, figure: FigureRecord) -> int:
     """The output nearest to the figure's time. Raises `InputError` where the analysis has no linear model."""
-    if not results.has(f"{figure.analysis}/linear"):
-        raise InputError(f'{results.path}: figure "{figure.name}": expected a linear analysis', f'"{figure.analysis}"')
+    check_part(results, figure, "linear", "a linear analysis")
     outputs = results.time(f"{figure.analysis}/time")
     return int(np.abs(outputs - (figure.times[0] if figure.times else outputs[0])).argmin())

@@ -28,7 +28,7 @@ from ..motion import (
 from ..movie_file import Frame, MovieOptions, make_movie
 from ..projection import AXIS_LENGTH, COLORS, PLANE, SPACE, TOOL_COLORS, TOOL_LENGTH
 from ..shapes import coarse_surface, numbered_cells
-from .style import directions, lit, literal, normals, projected, style
+from .style import SceneAxes, lit, literal, normals, projected, style
 
 SIZE, DPI = (8.0, 4.8), 120  # inches; 960 x 576 pixels
 FACE, AXIS, GROUND, WANTED = "#8fb8d4", "#30465c", "#8b95a3", "black"
@@ -37,14 +37,8 @@ TAKEN = COLORS[3]  # no color of a tool
 
 def write_motion(results_path: Path, path: Path, options: MovieOptions | None = None) -> list[str]:
     """Write a movie drawn by matplotlib; arguments and notes as in `make_movie`."""
-
-    def frames(
-        results: Results, analysis: str, outputs: Indices, scale: float | None, notes: list[str]
-    ) -> Iterator[Frame]:
-        return map(_Picture(results, analysis, outputs, scale, notes).at, range(len(outputs)))
-
     with style():
-        return make_movie(results_path, path, options, frames)
+        return make_movie(results_path, path, options, _Frames)
 
 
 def _ends(markers: Sequence[Marker], scale: float, reach: tuple[float, float], outputs: int) -> Array:
@@ -56,8 +50,8 @@ def _ends(markers: Sequence[Marker], scale: float, reach: tuple[float, float], o
     return np.concatenate([np.zeros((outputs, 0, 2, 3)), *lines], axis=1)
 
 
-class _Picture:
-    """Axes on which a scene is painted anew for every frame, over a background that is drawn once.
+class _Frames:
+    """Frames: axes on which a scene is painted anew for every frame, over a background that is drawn once.
 
     Over T outputs, as far exaggerated as it is drawn, m, global axes: `points` (T, p, 3) of the surfaces of all bodies
     with `triangles` (t, 3) on these, `joints` (T, j, 3), the ends of `axes_of_joints` (T, a, 2, 3) and of the axes of
@@ -67,8 +61,7 @@ class _Picture:
     def __init__(
         self, results: Results, analysis: str, outputs: Indices, scale: float | None, notes: list[str]
     ) -> None:
-        self.time, self.is_plane = results.time(analysis)[outputs], results.space.is_plane
-        self.view = PLANE if self.is_plane else SPACE
+        self.time, self.view = results.time(analysis)[outputs], PLANE if results.space.is_plane else SPACE
         bodies = moving_bodies(results, analysis, outputs)
         self.size = size_of(bodies)
         if scale is None:
@@ -101,24 +94,20 @@ class _Picture:
 
     def _draw_still(self, results: Results, paths: Sequence[PointTarget]) -> None:
         """The ground, the paths wanted, room for all that moves; labels of x and y, or directions."""
-        self.axes.plot(*projected(ground_places([results.scene]), self.view).T, "^", color=GROUND, markersize=10)
+        scene = SceneAxes(self.axes, self.view)
+        scene.plot(ground_places([results.scene]), "^", color=GROUND, markersize=10)
         for target in paths:
             if target.columns == results.space.translations:
-                wanted = projected(target.places, self.view)
-                self.axes.plot(*wanted.T, color=WANTED, linestyle="--", linewidth=0.8)
+                scene.plot(target.places, color=WANTED, linestyle="--", linewidth=0.8)
         for places in (self.points, self.axes_of_joints, self.tools):
-            self.axes.update_datalim(projected(places, self.view).reshape(-1, 2))
-        self.axes.set_aspect("equal", adjustable="datalim")
+            scene.drawn.append(projected(places, self.view).reshape(-1, 2))
         self.axes.margins(0.06)  # of the size of what is seen
-        self.axes.autoscale_view()
-        if self.is_plane:
-            self.axes.set_xlabel("x (m)")
-            self.axes.set_ylabel("y (m)")
-        else:
-            self.axes.set_axis_off()
-            directions(self.axes, 0.07 * self.size, self.view)
+        scene.finish()
 
-    def at(self, k: int) -> Frame:
+    def __iter__(self) -> Iterator[Frame]:
+        return map(self._at, range(len(self.time)))
+
+    def _at(self, k: int) -> Frame:
         """The frame of output k: what faces away is left out, far triangles are painted first, near ones hide them."""
         points, view = self.points[k], self.view
         triangles = self.triangles[normals(points, self.triangles) @ view.viewer > 0.0]

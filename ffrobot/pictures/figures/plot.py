@@ -25,7 +25,7 @@ from ...results.file import Results
 from ..projection import COLORS, LIMIT, LINK, View
 from ..shapes import AMPLITUDE, body_surface, drawn_mode
 from .configurations import draw_bode, draw_configurations, draw_path, draw_robot_modes
-from .shared import Curve, FigureRecord, curve_points, load_figures, motor_limits, read_points
+from .shared import Curve, FigureRecord, check_part, curve_points, load_figures, motor_limits, read_points
 from .standard import main_figures, standard_figures
 from .style import (
     DASHES,
@@ -167,18 +167,15 @@ def _outline(points: Array, cells: Integers, viewer: Array) -> Integers:
     if corners == 2:
         return cells
     normal = normals(points, cells)
-    edges = np.sort(sides(cells), axis=1)
-    owner = np.repeat(np.arange(len(cells)), corners)
-    order = np.lexsort(edges.T)
-    edges, owner = edges[order], owner[order]
-    paired = np.flatnonzero(np.all(edges[1:] == edges[:-1], axis=1))
+    edges, number = np.unique(np.sort(sides(cells), axis=1), axis=0, return_inverse=True)
+    number = number.ravel()
+    order = np.argsort(number, kind="stable")  # cells with the same edge follow each other
+    owner, number = order // corners, number[order]
+    paired = np.flatnonzero(number[1:] == number[:-1])
     one, other = normal[owner[paired]], normal[owner[paired + 1]]
     smooth = np.abs(np.einsum("ei,ei->e", one, other)) > FOLD
     smooth &= (one @ viewer > 0.0) == (other @ viewer > 0.0)
-    inner = np.zeros(len(edges), dtype=bool)
-    inner[paired[smooth]] = inner[paired[smooth] + 1] = True
-    # A fold is listed by both of its cells; once is enough.
-    return np.unique(edges[~inner], axis=0)
+    return np.delete(edges, number[paired[smooth]], axis=0)
 
 
 MANY, OFTEN = 4, 0.2  # columns, and part of the time at limits, above which lines hide each other
@@ -261,11 +258,7 @@ def _draw_torque_speed(axes: Axes, figure: FigureRecord, results: Results) -> No
 def _draw_placement(axes: Axes, figure: FigureRecord, results: Results) -> None:
     """Reach of a single patch along the link by mode; below, the patches found and those spread evenly."""
     group = f"{figure.analysis}/placement"
-    if not results.has(group):
-        raise InputError(
-            f'{results.path}: figure "{figure.name}": expected an analysis of kind = "placement"',
-            f'"{figure.analysis}"',
-        )
+    check_part(results, figure, "placement", 'an analysis of kind = "placement"')
     body = results.attributes(group)["body"]
     length = next(layout["length"] for layout in results.scene["pzt"] if layout["body"] == body)
     centers, frequency = results[f"{group}/candidates"], results[f"{group}/frequency"]

@@ -121,6 +121,12 @@ class FigureFile(Record):
     """Figures, in this order."""
 
 
+def check_part(results: Results, figure: FigureRecord, part: str, expected: str) -> None:
+    """Raise `InputError` where the analysis of a figure has no such part."""
+    if not results.has(f"{figure.analysis}/{part}"):
+        raise InputError(f'{results.path}: figure "{figure.name}": expected {expected}', f'"{figure.analysis}"')
+
+
 def load_figures(path: Path) -> FigureFile:
     """Read `figures.toml`. Raises `InputError` naming file, key, what was expected and what was found."""
     return validate(FigureFile, load_toml(path, "figure file"), path)
