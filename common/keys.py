@@ -60,5 +60,16 @@ Positive = Annotated[float, Field(gt=0.0), AfterValidator(_not_too_small)]
 NotNegative = Annotated[float, Field(ge=0.0), AfterValidator(_not_too_small)]
 Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]
+
+
+def _directed(vector: tuple[float, ...]) -> tuple[float, ...]:
+    if not any(vector):
+        raise ValueError(f"expected a direction, found {[0] * len(vector)}")
+    return vector
+
+
+Direction = Annotated[Vector3, AfterValidator(_directed)]
+"""Of any length but 0."""
+DirectionInPlane = Annotated[Vector2, AfterValidator(_directed)]
 ModeCount = Annotated[int, Field(gt=0, le=MOST_MODES)]
 PatchCount = Annotated[int, Field(gt=0, le=MOST_PATCHES)]

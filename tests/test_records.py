@@ -123,7 +123,7 @@ MISTAKES = {
     ),
     "axis of an angle without direction": (
         put("trajectory", point=None, x=None, y=None, angle="hand.tip", axis=[0.0, 0.0, 0.0], value="t"),
-        'trajectory.*expected the key "axis" only with angle, a direction',
+        'trajectory "tool": axis: expected a direction, found .0, 0, 0.',
     ),
     "rotor of a joint that slides and turns": (
         put("joint", type="cylindrical", rotor_inertia=1e-3),

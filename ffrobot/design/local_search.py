@@ -257,7 +257,7 @@ def _pass(
             options={"maxiter": ITERATIONS, **({"ftol": FTOL} if is_slsqp else {"gtol": GTOL, "xtol": XTOL})},
         )
         has_ended_well = done.success if is_slsqp else done.status in (1, 2)
-        return steps.best, "" if has_ended_well else f"{optimizer}: {done.message}"
+        return steps.best, "" if has_ended_well else f"{'SLSQP' if is_slsqp else optimizer}: {done.message}"
     return steps.best, ""
 
 

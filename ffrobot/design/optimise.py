@@ -240,7 +240,7 @@ class Front(Finding):
 
     def remarks(self) -> Iterator[str]:
         """Lines with the method and notes on the accuracy."""
-        how = f"{len(self.points)} designs by slsqp, {self.runs} runs with a tolerance of at most {self.tolerance:g}"
+        how = f"{len(self.points)} designs by SLSQP, {self.runs} runs with a tolerance of at most {self.tolerance:g}"
         yield f"how        {how}"
         for one in self.points:
             if one.message and not one.converged:

@@ -21,7 +21,7 @@ from ..common.errors import InputError
 from ..common.libraries import scipy
 from ..common.toml_files import load_toml
 from ..common.validation import Record, validate
-from ..mbs.fields.field_types import NotNegative, Positive, Quantity, Vector3
+from ..mbs.fields.field_types import Direction, NotNegative, Positive, Quantity
 from ..mbs.linear.joint_conditions import FreeCoordinates
 
 MOST_SPEEDS = 1000
@@ -54,9 +54,9 @@ class Milling(Record):
     """Angle at which a tooth enters the cut, from the normal to the feed, rad: 0 of up milling."""
     exit: Quantity
     """Angle at which it leaves the cut, rad: π of down milling."""
-    axis: Vector3 = (0.0, 0.0, 1.0)
+    axis: Direction = (0.0, 0.0, 1.0)
     """Axis of the tool, from the cut into the spindle, in the axes of the point (without own ones: global axes)."""
-    feed: Vector3 | None = None
+    feed: Direction | None = None
     """Direction of the feed of the tool in global axes; its part across the axis counts. Default: the worst one."""
     highest: Positive = 1000.0
     """Highest natural frequency, Hz, of modes that vibrate; modes above it are rigid."""
@@ -69,8 +69,6 @@ class Milling(Record):
     def _turns(self) -> Self:
         if not 0.0 <= self.entry < self.exit <= np.pi + 1e-9:
             raise ValueError(f"expected 0 ≤ entry < exit ≤ π, found {self.entry:g} and {self.exit:g}")
-        if not any(self.axis):
-            raise ValueError("expected an axis with a direction, found zero")
         return self
 
     def mean_forces(self, first: Array, last: Array) -> Array:

@@ -14,12 +14,12 @@ from pydantic import AfterValidator, ValidationInfo
 from ...common.arrays import Array
 from ...common.deferred import ReadBy
 from ...common.errors import InputError, quoted
+from ...common.keys import Direction as Direction
 from ...common.keys import ModeCount as ModeCount
 from ...common.keys import Name as Name  # offered here, with the other types of keys
 from ...common.keys import NotNegative as NotNegative
 from ...common.keys import PatchCount as PatchCount
 from ...common.keys import Positive as Positive
-from ...common.keys import Vector2 as Vector2
 from ...common.keys import Vector3 as Vector3
 from ...common.tables import LARGEST, shown
 from ...common.validation import Record, existing_file

@@ -17,13 +17,13 @@ from ...common.structs import struct
 from ...common.validation import Record
 from ..fields.field_types import (
     GROUND,
+    Direction,
     Name,
     NotNegative,
     Positive,
     Quantity,
     Reference,
     Side,
-    Vector3,
     body_of,
     loaded_reference,
     split_point,
@@ -381,13 +381,8 @@ class MovingJoint(JointRecord):
 class AxialJoint(MovingJoint):
     """A joint whose motion is along or about an axis, z of its triads."""
 
-    axis: Annotated[Vector3, NormalInPlane(SPATIAL)] = Field(default=None, validate_default=True)
+    axis: Annotated[Direction, NormalInPlane(SPATIAL)] = Field(default=None, validate_default=True)
     """Axis of motion in the axes of the first of `between` (ground: global), of any length."""
-
-    @model_validator(mode="after")
-    def _axis_has_direction(self) -> Self:
-        check_direction("axis", self.axis)
-        return self
 
     def triads(self) -> tuple[Array, Array]:
         """Return triads (3, 3) with z along the axis."""
@@ -415,9 +410,3 @@ class GearedJoint(AxialJoint):
         if self.stiffness is not None and not self.rotor_inertia:
             raise ValueError("expected a rotor_inertia above 0 with stiffness, found none: the rotor turns freely")
         return self
-
-
-def check_direction(key: str, axis: Sequence[float]) -> None:
-    """Raise `ValueError` for an axis without direction."""
-    if not any(axis):
-        raise ValueError(f"expected {key} with a direction, found {list(axis)}")

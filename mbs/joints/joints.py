@@ -7,8 +7,9 @@ from pydantic import model_validator
 
 from ...common.arrays import Array, as_floats
 from ...common.deferred import Deferred
+from ...common.keys import DirectionInPlane
 from ...common.rotations import exponential, quaternions, unit
-from ..fields.field_types import Vector2, Vector3
+from ..fields.field_types import Direction
 from ..fields.spelling import SPATIAL, Spelled, TaggedInPlane, place
 from .joint import (
     ALIGNED,
@@ -20,7 +21,6 @@ from .joint import (
     GearedJoint,
     JointRecord,
     LoopEquation,
-    check_direction,
 )
 
 
@@ -50,7 +50,7 @@ class PrismaticJoint(GearedJoint):
     """
 
     type: Literal["prismatic"]
-    axis: Annotated[Vector3, Spelled(Vector2, place)]
+    axis: Annotated[Direction, Spelled(DirectionInPlane, place)]
     """Axis of motion in the axes of the first of `between` (ground: global), of any length."""
 
     @classmethod
@@ -118,7 +118,7 @@ class UniversalJoint(AxialJoint):
 
     type: Literal["universal"]
     only_in = SPATIAL
-    second_axis: Vector3
+    second_axis: Direction
     """Second axis in the axes of the second of `between`, of any length."""
 
     units = ("rad", "rad")
@@ -130,7 +130,6 @@ class UniversalJoint(AxialJoint):
 
     @model_validator(mode="after")
     def _axes_are_square(self) -> Self:
-        check_direction("second_axis", self.second_axis)
         x, y = unit(np.array(self.axis)), unit(self.orientation @ self.second_axis)
         cosine = float(x @ y)
         if abs(cosine) > SQUARE:

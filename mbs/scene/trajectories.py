@@ -15,6 +15,7 @@ from ...common.rotations import of_rpy
 from ...common.validation import Record
 from .._core import TimeFunction
 from ..fields.field_types import (
+    Direction,
     Expression,
     Name,
     NotNegative,
@@ -210,7 +211,7 @@ class Trajectory(MotionKeys):
     """Body, or section "BODY.POINT", whose absolute angle about `axis` follows the trajectory: one component of its
     orientation, the others are free; in planar scenes about z. Of the section's direction that is across `axis` where
     its axes are global ones, the projection on the plane across `axis` has this angle."""
-    axis: Annotated[Vector3 | None, IN_SPACE] = None
+    axis: Annotated[Direction | None, IN_SPACE] = None
     """Axis of `angle`, global axes; by default z."""
     motor: str | None = None
     """Joint whose motor follows the trajectory; a compliant gear (`stiffness`) lets the joint coordinate differ from
@@ -227,7 +228,7 @@ class Trajectory(MotionKeys):
     """Orientation that `rotation_vector` rotates, rad; by default the global axes."""
     rpy: Annotated[Triple | None, IN_SPACE] = None
     """Orientation of the section: roll, pitch, yaw about the ground's x, y, z in this order, rad; expressions in t."""
-    tool_axis: Annotated[Vector3 | None, IN_SPACE] = None
+    tool_axis: Annotated[Direction | None, IN_SPACE] = None
     """Direction of the section, in its axes, that stays along `direction`."""
     direction: Annotated[Triple | None, IN_SPACE] = None
     """Direction of `tool_axis` in global axes, of any length; expressions in t."""
@@ -242,8 +243,6 @@ class Trajectory(MotionKeys):
     @model_validator(mode="after")
     def _consistent(self, info: ValidationInfo) -> Self:
         subject = one_of(self, keys_here(self, SUBJECTS, info))
-        if self.axis is not None and (self.angle is None or not any(self.axis)):
-            raise ValueError(f'expected the key "axis" only with angle, a direction, found {list(self.axis)}')
         allowed = keys_here(self, (*PLACES, *ORIENTATIONS), info) if subject == "point" else ("value",)
         tables = ("waypoints", "via")
         given = only(self, subject, (*allowed, *tables), (*PLACES, *ORIENTATIONS, "value", *tables))
@@ -285,13 +284,12 @@ class Trajectory(MotionKeys):
         keys = [key for key in ORIENTATIONS if getattr(self, key) is not None]
         if len(keys) > 1:
             raise ValueError(f"expected one orientation at most ({quoted(ORIENTATIONS)}), found {quoted(keys)}")
-        for key, beside in (("reference_rotation_vector", "rotation_vector"), ("tool_axis", "direction")):
+        beside_of = {"reference_rotation_vector": "rotation_vector", "tool_axis": "direction", "axis": "angle"}
+        for key, beside in beside_of.items():
             if getattr(self, key) is not None and getattr(self, beside) is None:
                 raise ValueError(f'expected the key "{key}" only with {beside}, found it alone')
         if self.direction is not None and self.tool_axis is None:
             raise ValueError('expected the key "tool_axis" with direction: which direction of the section, found none')
-        if self.tool_axis is not None and not any(self.tool_axis):
-            raise ValueError(f"expected tool_axis with a direction, found {list(self.tool_axis)}")
         if not self._has_poses:
             return
         if keys:

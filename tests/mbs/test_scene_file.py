@@ -174,6 +174,7 @@ MISTAKES = [
         for key in ("moment_limit", "gear_ratio", "rotor_inertia", "viscous_friction")
     ),
     ('"weld"', '"prismatic"', 'joint "W": expected an axis with a direction', "found none"),
+    ('"weld"', '"prismatic"\naxis = [0, 0.0]', 'joint "W": axis: expected a direction', "found [0, 0]"),
     ('"weld"', '"weld"\naxis = [1, 0]', 'joint "W": expected the key "axis" only in prismatic', "found it in a weld"),
     ('"weld"', '"weld"\nat = [1, 0]', 'joint "W": expected the key "at" only in joints to "ground"', "found it between"),
     ('"link1.root"', '"link1"', 'joint "O": between[1]: expected a point as "BODY.POINT", found "link1"', ""),

@@ -211,7 +211,7 @@ def test_a_feed_is_in_global_axes(tmp_path):
     [
         ({"exit": "45*deg"}, r"cutter\.toml: expected 0 ≤ entry < exit ≤ π"),
         ({"teeth": 0}, "teeth"),
-        ({"axis": [0.0, 0.0, 0.0]}, "an axis with a direction"),
+        ({"axis": [0.0, 0.0, 0.0]}, "axis: expected a direction"),
         ({"speeds": "fast"}, 'expected a list, or "FIRST:LAST:COUNT" of at most 1000, found "fast"'),
         ({"speeds": "100:200:0"}, 'found "100:200:0"'),
         ({"speeds": "100:200:9999999999999"}, 'found "100:200:9999999999999"'),
