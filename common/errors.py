@@ -99,13 +99,21 @@ def blaming_file(problem: Callable[[Exception], str]) -> Iterator[None]:
         raise InputError(problem(error)) from error
 
 
+def refuse(lines: Iterable[str], where: object = "") -> None:
+    """Raise `InputError` with all `lines`, if there are any, and the file `where` before each."""
+    if texts := [f"{where}: {line}" if where else line for line in lines]:
+        raise InputError("\n".join(texts))
+
+
 @contextmanager
 def naming(where: object) -> Iterator[None]:
-    """Context that puts `where` (file and key) before the messages of `InputError`."""
+    """Context that puts `where` (file and key) before each line of an `InputError`, unless it begins with it."""
     try:
         yield
     except InputError as error:
-        raise InputError(f"{where}: {error}") from error.__cause__
+        if str(error).startswith(f"{where}:"):
+            raise
+        raise InputError("\n".join(f"{where}: {line}" for line in str(error).split("\n"))) from error.__cause__
 
 
 ELSEWHERE = {

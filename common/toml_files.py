@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from .errors import InputError
+from .errors import InputError, refuse
 from .outputs import check_regular
 from .tables import DEEPEST, CsvTable, beyond_limits, parse_csv
 
@@ -80,8 +80,7 @@ def parse_toml(text: str, path: Path, kind: str) -> dict[str, Any]:
 
 def check_limits(data: dict[str, Any], path: Path) -> None:
     """Raise `InputError`, a line each, for values that no file may hold: see `tables.beyond_limits`."""
-    if beyond := list(beyond_limits(data)):
-        raise InputError("\n".join(f"{path}: {line}" for line in beyond[:10]))
+    refuse(list(beyond_limits(data))[:10], path)
 
 
 def toml_text(data: Mapping[str, Any]) -> str:

@@ -1,6 +1,6 @@
 """`ffrobot export`, and `ffrobot import` of bodies: which format takes which file, and how it is written."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from rich.console import Console
 
-from ..common.errors import InputError, check_known, either, quoted
+from ..common.errors import InputError, check_known, either, naming, quoted
 from ..common.files import check_new_file, check_new_folder, check_output, holds, write_atomically
 from ..common.outputs import check_not_an_input
 from ..common.tables import shown
@@ -168,14 +168,11 @@ def import_body(path: Path, output: Path) -> Exported:
         InputError: it cannot be read, or cannot be a body; names the file.
         SolveError: the modal body file cannot be written.
     """
-    text = read_text(path, "file of a flexible body")
-    try:
-        with np.errstate(over="raise", divide="raise", invalid="raise"):
-            body, remarks = READERS[path.suffix.lower()](text, path.stem)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    except (FloatingPointError, np.linalg.LinAlgError) as error:
-        raise InputError(f"{path}: expected numbers of a body", f"ones that are too large: {error}") from None
+    with naming(path), np.errstate(over="raise", divide="raise", invalid="raise"):
+        try:
+            body, remarks = READERS[path.suffix.lower()](read_text(path, "file of a flexible body"), path.stem)
+        except (FloatingPointError, np.linalg.LinAlgError) as error:
+            raise InputError("expected numbers of a body", f"ones that are too large: {error}") from None
     check_output(output, FORMAT)
     write_modal_body(output, body)
     return Exported(output, f"{body.name}, {body.modes_in_words}, interfaces {', '.join(body.interfaces)}", remarks)
@@ -190,10 +187,9 @@ def print_import(imported: Imported, console: Console) -> None:
     robot, scene = imported.robot, imported.scene
     moving = [joint for joint in scene["joint"] if joint["type"] != "weld"]
     mass = sum(body["rigid"]["mass"] for body in scene["body"] if "rigid" in body)
-    console.print(
+    console.out(
         f"{robot.name}: {len(robot.links)} links and {len(robot.joints)} joints, of which {len(scene['body'])} bodies"
         f" and {len(moving)} joints move; {mass:.6g} kg in rigid bodies",
-        soft_wrap=True,
     )
     rows = []
     for joint in moving:
@@ -206,29 +202,26 @@ def print_import(imported: Imported, console: Console) -> None:
     if imported.masses:
         rows = []
         for each in imported.masses:
-            inertial = robot.links[each.link].inertial
-            mass = inertial.mass if inertial is not None else 0.0
             ratios = f"{each.density:.4g}", f"{each.inertia_ratio:.3g}", f"{each.center_distance:.2g}"
-            ratios = ratios if each.volume else ("–", "–", "–")
-            rows.append(
-                (each.link, "closed" if each.is_closed else "open", f"{mass:.4g}", f"{each.volume:.3g}", *ratios)
-            )
+            kind, of_shape = "closed" if each.is_closed else "open", ratios if each.volume else ("–", "–", "–")
+            rows.append((each.link, kind, f"{each.mass:.4g}", f"{each.volume:.3g}", *of_shape))
         headers = "link", "mesh", "mass kg", "volume m³", "implied kg/m³", "inertia: mesh / URDF", "centers apart m"
         console.print()
         console.print(plain_table(headers, rows))
-        console.print(
+        console.out(
             "note       meshes are skins: a filled one has the stiffness of no real casting; links are rigid unless"
             " --flexible names a file",
-            soft_wrap=True,
         )
-    for remark in imported.remarks:
-        console.print(f"note       {remark}", soft_wrap=True)
-    for path in imported.files:
-        console.print(f"written    {path}", soft_wrap=True)
+    _print_written(imported.files, imported.remarks, console)
 
 
 def print_export(exported: Exported, console: Console) -> None:
     """Print the file written, and remarks on what its format cannot hold."""
-    for remark in exported.remarks:
-        console.print(f"note       {remark}", soft_wrap=True)
-    console.print(f"written    {exported.path}: {exported.what}", soft_wrap=True)
+    _print_written([f"{exported.path}: {exported.what}"], exported.remarks, console)
+
+
+def _print_written(files: Iterable[object], remarks: Iterable[str], console: Console) -> None:
+    for remark in remarks:
+        console.out(f"note       {remark}")
+    for file in files:
+        console.out(f"written    {file}")

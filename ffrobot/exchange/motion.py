@@ -4,15 +4,15 @@ import json
 import math
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal
 
 import numpy as np
 
 from ..common.arrays import Array, Integers, as_list, as_rows
-from ..common.errors import InputError, blaming_file, check_known, quoted
+from ..common.errors import InputError, blaming_file, check_known, naming, quoted
 from ..common.libraries import extras, scipy
 from ..common.structs import struct
 from ..common.tables import LARGEST, as_csv, shown
@@ -202,7 +202,6 @@ def _ros(message: Mapping[str, Any], types: Mapping[str, Any]) -> Any:
 
 STATES = "sensor_msgs/msg/JointState"
 TEXTS = (".json", ".yaml", ".yml")
-T = TypeVar("T")
 MOVING = 0.01  # of the largest rate: less is rest
 NESTED = ("goal", "planned_trajectory", "joint_trajectory", "trajectory")
 """Keys under which messages of planners have a JointTrajectory."""
@@ -210,7 +209,8 @@ NESTED = ("goal", "planned_trajectory", "joint_trajectory", "trajectory")
 
 def read_motion(path: Path) -> Waypoints:
     """Read waypoints (rad or m, over s) from a file with a JointTrajectory, or a bag of ROS: see `read_record`."""
-    return _named(path, lambda path: read_record(path).waypoints())
+    with naming(path):
+        return read_record(path).waypoints()
 
 
 def read_record(path: Path) -> Recorded:
@@ -222,16 +222,8 @@ def read_record(path: Path) -> Recorded:
         InputError: it has none, or numbers that are no motion; names the file.
         SolveError: `rosbags` is not installed.
     """
-    return _named(path, _from_text if path.suffix.lower() in TEXTS else _from_bag)
-
-
-def _named(path: Path, read: Callable[[Path], T]) -> T:
-    """What `read` makes of the file, which messages name."""
-    try:
-        return read(path)
-    except InputError as error:
-        text = str(error)
-        raise InputError(text if text.startswith(str(path)) else f"{path}: {text}") from None
+    with naming(path):
+        return (_from_text if path.suffix.lower() in TEXTS else _from_bag)(path)
 
 
 def path_text(motion: Waypoints) -> str:

@@ -1,7 +1,7 @@
 """Loading a scene from a file or from Python: syntax, keys, and that everything it refers to exists."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ import numpy as np
 
 from ..common.arrays import Array
 from ..common.deferred import loaded
-from ..common.errors import InputError, did_you_mean, quoted
+from ..common.errors import InputError, did_you_mean, quoted, refuse
 from ..common.files import AnyPath
 from ..common.python_files import python_allowed
 from ..common.toml_files import load_toml, parse_toml, read_text
@@ -108,9 +108,9 @@ def validated_scene(
     Raises `InputError` as `load_scene` does.
     """
     space = SPATIAL if data.get("space") == SPATIAL else PLANAR
-    _raise(_unavailable_keys(data) if space == SPATIAL else (), path)
+    refuse(_unavailable_keys(data) if space == SPATIAL else (), path)
     keys = validate(SceneKeys, with_times_of_actuation(data), path, functions, space)
-    _raise(problems(keys), path)
+    refuse(problems(keys), path)
     for link in (body.link for body in keys.body):
         if isinstance(link, LinkTable):
             from ..fe_models.link_file import read_link
@@ -118,12 +118,6 @@ def validated_scene(
             read_link(link)
     check_functions(keys, path)
     return Scene.model_construct(**dict(in_3d(keys)), path=path.absolute(), text=text)  # the keys are validated
-
-
-def _raise(texts: Iterable[str], path: Path) -> None:
-    lines = [f"{path}: {problem}" for problem in texts]
-    if lines:
-        raise InputError("\n".join(lines))
 
 
 def _unavailable_keys(data: dict[str, object]) -> Iterator[str]:

@@ -10,7 +10,7 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from ..common.errors import InputError
+from ..common.errors import refuse
 from ..common.structs import struct
 from ..common.validation import Record
 from ..fe_models.link_records.families import FAMILIES
@@ -57,9 +57,7 @@ def bodies_in_pieces(scene: Scene, counts: Mapping[str, int]) -> dict[str, BodyI
                 if name == body.name and point in places:
                     places[tool.name] = places[point][0], tool.name
             divided[body.name] = BodyInPieces(replace(whole, places=places), names)
-    problems = [f"{scene.path}: {problem}" for problem in _problems(scene, divided)]
-    if problems:
-        raise InputError("\n".join(problems))
+    refuse(_problems(scene, divided), scene.path)
     return {name: body for name, body in divided.items() if len(body.names) > 1}
 
 

@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.linalg import eigh
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.rotations import point_inertia
 from ...common.structs import struct
@@ -98,7 +98,7 @@ class ShapeIntegrals:
     @property
     def about_center(self) -> Array:
         """Return the inertia (3, 3) about the center of mass, kg·m², in axes of the body."""
-        return as_floats(self.inertia - point_inertia(self.mass, self.first_moment / self.mass))
+        return self.inertia - point_inertia(self.mass, self.first_moment / self.mass)
 
     def transformed(self, T: Array) -> ShapeIntegrals:
         """Return the integrals in modal coordinates p (m,) with q = T p, T (n, m)."""
@@ -140,7 +140,7 @@ def slopes(S: Array) -> tuple[Array, Array]:
     return np.einsum("abc,bckl->alk", LEVI_CIVITA, S), np.array(centrifugal)
 
 
-def with_agreed_masses(integrals: ShapeIntegrals) -> tuple[ShapeIntegrals, tuple[str, ...]]:
+def _with_agreed_masses(integrals: ShapeIntegrals) -> tuple[ShapeIntegrals, tuple[str, ...]]:
     """Adjust modal masses to those of the mode shapes; returns the integrals and a remark on the change, if any.
 
     In files of few digits M_e is off ∫ρΦᵀΦ of masses and shapes. Where nothing has inertia about the axis, so that no
@@ -151,9 +151,6 @@ def with_agreed_masses(integrals: ShapeIntegrals) -> tuple[ShapeIntegrals, tuple
             alone has, S̄ᵀS̄/m.
     """
     M, translational = integrals.modal_mass, integrals.translational_mass
-    largest = np.abs(M).max(initial=0.0)
-    if not largest > 0:
-        return integrals, ()  # which is refused as no mass matrix
     mean = np.sum(integrals.S_bar**2, axis=0) / integrals.mass
     sizes = np.sqrt(np.abs(mean) / np.maximum(np.diag(M), 1e-300))
     if sizes.max(initial=0.0) > 1.0 + ROUNDED:
@@ -162,7 +159,7 @@ def with_agreed_masses(integrals: ShapeIntegrals) -> tuple[ShapeIntegrals, tuple
             f"mode {sizes.argmax() + 1} whose shape moves the center of mass {sizes.max():.3g} times as far as its"
             " modal mass allows. Shapes and modal masses of the file contradict each other",
         )
-    off = np.abs(M - translational).max() / largest
+    off = np.abs(M - translational).max() / max(np.abs(M).max(), 1e-300)
     if off <= EXACT or np.linalg.eigvalsh(integrals.about_center)[0] > EXACT * np.abs(integrals.inertia).max():
         return integrals, ()
     if off > ROUNDED:
@@ -217,11 +214,11 @@ def nodes_of(body: ModalBody) -> tuple[dict[int, Interface], dict[str, int]]:
 
 
 def note(body: ModalBody, numbers: Mapping[str, int]) -> str:
-    """Return a comment for what formats lack, which `noted` reads: reference condition, numbers of interfaces."""
+    """Return a comment for what formats lack, which `_noted` reads: reference condition, numbers of interfaces."""
     return f"ffrobot: {body.reference_condition}; {', '.join(f'{name}={number}' for name, number in numbers.items())}"
 
 
-def noted(text: str, nodes: Nodes) -> tuple[str | None, dict[str, int]]:
+def _noted(text: str, nodes: Nodes) -> tuple[str | None, dict[str, int]]:
     """Reference condition and number of each interface from a `note` in `text`; None and {} without one.
 
     Raises:
@@ -259,14 +256,14 @@ NOT_IN_THE_FILE = (
 )
 
 
-def modal_body(
-    name: str, integrals: ShapeIntegrals, nodes: Nodes, numbers: Mapping[str, int], condition: str | None = None
-) -> ModalBody:
-    """The body of foreign integrals and nodes, with modes of unit mass; `numbers` of the nodes that are interfaces.
+def modal_body(name: str, integrals: ShapeIntegrals, nodes: Nodes, text: str) -> tuple[ModalBody, tuple[str, ...]]:
+    """The body of foreign integrals and nodes, with modes of unit mass, and remarks; `text` may have a `note`.
 
     Raises:
         InputError: a mode has no stiffness, or the integrals cannot be those of a body.
     """
+    condition, numbers = _noted(text, nodes)
+    integrals, remarks = _with_agreed_masses(integrals)
     T, omega2 = _orthonormal(integrals)
     integrals, n = integrals.transformed(T), len(omega2)
     nodes = {number: Interface(at.position, at.translation @ T, at.rotation @ T) for number, at in nodes.items()}
@@ -284,7 +281,7 @@ def modal_body(
     if condition == CRAIG_BAMPTON and not constraint:
         condition = "cantilever"  # which holds the root alike
     omega, line = np.sqrt(omega2), _stations_at(ends)
-    return ModalBody(
+    body = ModalBody(
         name=name,
         kind="beam" if sections["J_spin"] else "solid",
         reference_condition=condition or _condition(interfaces),
@@ -306,6 +303,7 @@ def modal_body(
         ffrobot_version=VERSION,
         **sections,  # type: ignore[arg-type]
     )
+    return body, (NOT_IN_THE_FILE, *remarks)
 
 
 def _orthonormal(integrals: ShapeIntegrals) -> tuple[Array, Array]:

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from ...common.arrays import as_floats
 from ...common.errors import InputError
 from ...common.rotations import skew
 from ...fe_models.modal_body import ModalBody
@@ -47,7 +46,7 @@ def exudyn_file(body: ModalBody) -> tuple[bytes, tuple[str, ...]]:
 
 def _reduced_order(integrals: ShapeIntegrals) -> dict[str, Any]:
     n, S, one = integrals.n_modes, integrals.S_bar_kl, np.eye(3)
-    center = as_floats(integrals.first_moment / integrals.mass)
+    center = integrals.first_moment / integrals.mass
     tilde_tilde = np.einsum("ab,lm->lamb", one, np.trace(S)) - np.einsum("balm->lamb", S)
     return {
         "massMatrixReduced": integrals.modal_mass,

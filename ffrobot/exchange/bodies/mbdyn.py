@@ -18,17 +18,7 @@ from ...common.rotations import point_inertia
 from ...fe_models.modal_body import Interface, ModalBody
 from ...fe_models.modal_body.parts import LEVI_CIVITA
 from ...mesh.included import number_of
-from .integrals import (
-    NOT_IN_THE_FILE,
-    ShapeIntegrals,
-    integrals_of,
-    modal_body,
-    nodes_of,
-    note,
-    noted,
-    slopes,
-    with_agreed_masses,
-)
+from .integrals import ShapeIntegrals, integrals_of, modal_body, nodes_of, note, slopes
 
 GROUP = re.compile(r"\*\*\s*RECORD GROUP\s+(\d+)")
 TITLES = {
@@ -99,7 +89,7 @@ def read_fem(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
     if rest or not modes:
         raise InputError(f"record 8: expected six numbers for each of {count} nodes and each mode", len(shapes))
     shapes = shapes.reshape(modes, count, 6)
-    remarks = [NOT_IN_THE_FILE]
+    remarks = []
     matrices: dict[str, Any] = {"damping": np.zeros((modes, modes))}
     for name_of, k in (("modal_mass", 9), ("stiffness", 10), ("damping", 13)):
         if k in records:
@@ -121,9 +111,9 @@ def read_fem(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
         label: Interface(place, phi[:3], phi[3:])
         for label, place, phi in zip(labels, x, shapes.transpose(1, 2, 0), strict=True)
     }
-    condition, numbers = noted("\n".join(line for line in text.splitlines()[:5] if line.startswith("**")), nodes)
-    integrals, texts = with_agreed_masses(integrals)
-    return modal_body(name, integrals, nodes, numbers, condition), (*remarks, *texts)
+    comments = "\n".join(line for line in text.splitlines()[:5] if line.startswith("**"))
+    body, of_body = modal_body(name, integrals, nodes, comments)
+    return body, (*of_body, *remarks)
 
 
 def _records(text: str) -> dict[int, list[str]]:

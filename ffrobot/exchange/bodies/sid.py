@@ -19,16 +19,7 @@ from ...common.rotations import skew
 from ...common.tables import shown
 from ...fe_models.modal_body import Interface, ModalBody
 from ...mesh.included import number_of
-from .integrals import (
-    NOT_IN_THE_FILE,
-    ShapeIntegrals,
-    integrals_of,
-    modal_body,
-    nodes_of,
-    note,
-    noted,
-    with_agreed_masses,
-)
+from .integrals import ShapeIntegrals, integrals_of, modal_body, nodes_of, note
 
 ROWS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Entries of a symmetric matrix in the six rows of J."""
@@ -96,10 +87,8 @@ def read_sid(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
     nodes = {int(node.number("number")): _interface(modal, node) for node in modal.nodes}
     if not nodes:
         raise InputError("frame: expected at least one node", "none")
-    condition, numbers = noted(head, nodes)
-    agreed, texts = with_agreed_masses(integrals)
-    remarks = (NOT_IN_THE_FILE, *texts, *_turned_nodes(modal), *_checks(modal, integrals))
-    return modal_body(name, agreed, nodes, numbers, condition), remarks
+    body, remarks = modal_body(name, integrals, nodes, head)
+    return body, (*remarks, *_turned_nodes(modal), *_checks(modal, integrals))
 
 
 def _interface(modal: Modal, node: SidObject) -> Interface:
@@ -158,9 +147,8 @@ def _symmetric_part(slope: Array, Me: Array) -> Array | None:
 
 def _is_in_both(modal: Modal, slope: Array) -> bool:
     """Whether G_e has twice the symmetric part that C_r has: geometric stiffness would be in C_r alone."""
-    n, Ge = modal.modes, modal["Ge"].m0
-    if Ge.shape != (n, 3 * n):
-        return False
+    n = modal.modes
+    Ge = modal["Ge", (n, 3 * n)].m0
     layouts = (Ge.reshape(n, 3, n).transpose(1, 0, 2), Ge.reshape(n, n, 3).transpose(2, 0, 1))
     twice = slope + slope.transpose(0, 2, 1)
     parts = (0.5 * (each + each.transpose(0, 2, 1)) for each in layouts)

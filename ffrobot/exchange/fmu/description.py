@@ -1,12 +1,15 @@
 """What FMUs (FMI 2.0) say of themselves, and the archive that they are in."""
 
+import platform
 import re
+import sys
 import zipfile
 from collections.abc import Iterable, Mapping
 from io import BytesIO
 from uuid import NAMESPACE_URL, uuid5
 from xml.etree import ElementTree
 
+from ...common.errors import InputError
 from ...common.structs import struct
 from ...common.version import VERSION
 
@@ -127,6 +130,14 @@ PLATFORMS: Mapping[tuple[str, str], tuple[str, str]] = {
     ("win32", "AMD64"): ("win64", ".dll"),
 }
 """By `sys.platform` and processor: FMI 2.0's name of the platform, and the end of a library's name there."""
+
+
+def platform_here() -> tuple[str, str]:
+    """Return its entry of `PLATFORMS`. Raises `InputError` where FMI has no name for it."""
+    here = sys.platform, platform.machine()
+    if here not in PLATFORMS:
+        raise InputError(f"--format fmu: FMI 2.0 has no name for {here[0]} on {here[1]}")
+    return PLATFORMS[here]
 
 
 def guid_of(numbers: str, variables: Iterable[Variable]) -> str:

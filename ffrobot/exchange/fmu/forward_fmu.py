@@ -1,8 +1,6 @@
 """`ffrobot export SCENE.toml --format fmu`: a forward motion as an FMU for co-simulation."""
 
 import logging
-import platform
-import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -10,7 +8,7 @@ import numpy as np
 
 from ...actuation.patches.link_patches import LinkPatches
 from ...common.arrays import Array
-from ...common.errors import InputError, check_known, quoted
+from ...common.errors import InputError, check_known, naming, quoted
 from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
 from ...mbs import _core
@@ -30,7 +28,6 @@ from ...run.watcher import Watcher
 from ...scene.load import load_scene
 from ...scene.scene import Scene
 from .description import (
-    PLATFORMS,
     Variable,
     add,
     finished,
@@ -39,6 +36,7 @@ from .description import (
     motor,
     new_root,
     numbered,
+    platform_here,
     voltage,
     zipped,
 )
@@ -58,15 +56,14 @@ def forward_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str
     scene = load_scene(path)
     chosen = _chosen(path, scene, analysis)
     _check(path, scene)
-    place = PLATFORMS.get((sys.platform, platform.machine()))
-    if place is None:
-        raise InputError(f"{path}: --format fmu: FMI 2.0 has no name for {sys.platform} on {platform.machine()}")
+    with naming(path):
+        folder, suffix = platform_here()
     prepared = prepare_scene(scene, _Logged())
     bodies = mode_levels(scene, prepared.bodies)[-1]  # "auto": all of them
     model = with_compliance((with_bodies(prepared, bodies).model).without_paths())
     unit = _forward_unit(model, prepared, chosen, AXES[:2] if scene.is_planar else AXES)
     unit.data.guid = guid_of(unit.data.to_bytes().hex(), (*unit.inputs, *unit.outputs))
-    identifier, (folder, suffix) = identifier_of(scene.name, chosen.name), place
+    identifier = identifier_of(scene.name, chosen.name)
     content = {
         "modelDescription.xml": _model_description(unit, identifier, f"{scene.name}, {chosen.name}", chosen),
         "resources/model.bin": unit.data.to_bytes(),  # mbs/fmu/forward.cpp
@@ -140,7 +137,7 @@ def _forward_unit(model: Model, prepared: Prepared, analysis: Forward, axes: str
     data.spectral_radius, data.tolerance = analysis.spectral_radius, analysis.tolerance
     data.duration = analysis.last_time
     inputs = [*_motors(model), *_voltages(model, prepared.patches)]
-    linear = [*_joints(model), *_modes(model), *_strains(model, prepared.links)]
+    linear = [*_joints(model), *_modes_and_strains(model, prepared.links)]
     places = list(_places(model))
     data.inputs = [direction for _, direction in inputs]
     data.linear, data.places = [output for _, output in linear], [output for _, output in places]
@@ -200,26 +197,25 @@ def _has_own_coordinates(node: Node) -> bool:
     return bool(joint.units) and joint.q_count == joint.freedoms and not (joint.type == "planar" and node.backwards)
 
 
-def _modes(model: Model) -> Iterator[Linear]:
-    """Modal coordinates of the file of each body: of a planar scene those that move in its plane."""
-    for node in model.tree.nodes:
-        name, entries = node.body.name, list(range(node.p_q.start, node.p_q.stop))
-        for k, row in enumerate(node.body.modal_transform, 1):
-            if np.any(row):
-                variable = Variable(f"modal/{name}/{k}", "kg0.5.m", f"modal coordinate {k} of {name}")
-                yield variable, _core.LinearOutput(entries, row.tolist())
+def _modes_and_strains(model: Model, links: Mapping[str, ModalBody]) -> Iterator[Linear]:
+    """Modal coordinates of the file of each body, then strains at points of links where files have them, link axes.
 
-
-def _strains(model: Model, links: Mapping[str, ModalBody]) -> Iterator[Linear]:
-    """At the points of links where their files have strains, in axes of the link: what the modes make of them."""
+    Of a planar scene those that move in its plane.
+    """
+    rows = list[tuple[Node, Variable, Array]]()
     for node in model.tree.nodes:
-        name, entries = node.body.name, list(range(node.p_q.start, node.p_q.stop))
+        name, T = node.body.name, node.body.modal_transform
+        for k, row in enumerate(T, 1):
+            rows.append((node, Variable(f"modal/{name}/{k}", "kg0.5.m", f"modal coordinate {k} of {name}"), row))
+    for node in model.tree.nodes:
+        name, T = node.body.name, node.body.modal_transform
         for label, point in links[name].stress.items() if name in links else ():
-            for component, row in zip(COMPONENTS, point.strain @ node.body.modal_transform, strict=True):
-                if np.any(row):
-                    about = f"strain {component} at {label} of {name}"
-                    variable = Variable(f"strain/{name}.{label}/{component}", "1", about)
-                    yield variable, _core.LinearOutput(entries, row.tolist())
+            for component, row in zip(COMPONENTS, point.strain @ T, strict=True):
+                about = f"strain {component} at {label} of {name}"
+                rows.append((node, Variable(f"strain/{name}.{label}/{component}", "1", about), row))
+    for node, variable, row in rows:
+        if np.any(row):
+            yield variable, _core.LinearOutput(list(range(node.p_q.start, node.p_q.stop)), row.tolist())
 
 
 def _places(model: Model) -> Iterator[tuple[str, _core.PlaceOutput]]:

@@ -1,11 +1,9 @@
 """`ffrobot export`: the linear model of an analysis, or the controller of a loop, as an FMU or as numbers in C."""
 
 import os
-import platform
 import shlex
 import shutil
 import subprocess
-import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -23,7 +21,6 @@ from ...common.structs import struct
 from ...mbs.joints.joints import JOINT_TYPES, FreeJoint
 from ...results.file import Results
 from .description import (
-    PLATFORMS,
     Variable,
     add,
     finished,
@@ -32,6 +29,7 @@ from .description import (
     motor,
     new_root,
     numbered,
+    platform_here,
     voltage,
     zipped,
 )
@@ -188,16 +186,15 @@ def _coordinate(name: str, units: Mapping[str, str]) -> tuple[str, str]:
         return {"rate": f"{unit}/s", "gyro": "rad/s"}.get(measure, f"{unit}/s2"), f"{measure} of the {what}"
     kind, _, rest = name.partition("/")
     place, _, last = rest.rpartition("/")
-    if kind == "state":  # of a controller
-        return "1", f"state {rest}"
-    if kind == "strain":
-        return "1", f"strain at {rest}"
-    if kind == "pzt":
-        return "V", f"voltage that patch {last} of {place} measures"
-    if kind == "modal":
-        return "kg0.5.m", f"modal coordinate {last} of {place}"
-    if kind == "point":
-        return "m", f"place of {place} along {last}"
+    plain = {
+        "state": ("1", f"state {rest}"),  # of a controller
+        "strain": ("1", f"strain at {rest}"),
+        "pzt": ("V", f"voltage that patch {last} of {place} measures"),
+        "modal": ("kg0.5.m", f"modal coordinate {last} of {place}"),
+        "point": ("m", f"place of {place} along {last}"),
+    }
+    if kind in plain:
+        return plain[kind]
     if kind == "frame" and place:  # in the plane
         return "rad" if last == "angle" else "m", f"{last} of the frame of {place}"
     if kind == "frame":  # in space
@@ -300,13 +297,13 @@ def _binary(unit: Unit, files: Mapping[str, str]) -> dict[str, bytes] | str:
 
     The reason where there is none.
     """
-    place = PLATFORMS.get((sys.platform, platform.machine()))
-    if place is None:
-        return f"FMI 2.0 has no name for {sys.platform} on {platform.machine()}"
+    try:
+        folder, suffix = platform_here()
+    except InputError as error:
+        return str(error)
     compiler = shlex.split(os.environ.get("CC", "")) or [name for name in COMPILERS if shutil.which(name)][:1]
     if not compiler:
         return f"found no C compiler ({', '.join(COMPILERS)}, or what CC names)"
-    folder, suffix = place
     with tempfile.TemporaryDirectory(prefix="ffrobot-fmu-") as temporary:
         for name, text in files.items():
             (Path(temporary) / name).write_text(text, encoding="utf-8")

@@ -12,7 +12,7 @@ from ...common.arrays import Array
 from ...common.errors import InputError, quoted
 from ...common.rotations import rpy_of
 from ...mbs.fields.field_types import GROUND
-from ...mbs.joints.joint import JointRecord, MovingJoint
+from ...mbs.joints.joint import JointRecord
 from ...mbs.joints.joints import ScrewJoint
 from ...mbs.model.build import build_model
 from ...mbs.model.nodes import Node
@@ -96,20 +96,21 @@ def _losses(scene: Scene, loaded: Mapping[str, LoadedBody], tree: KinematicTree,
 
 
 def _of_keys(tree: KinematicTree, size: float) -> Iterator[str]:
-    joints = [node.joint for node in tree.nodes]
-    sliding = [joint for joint in joints if joint.type in ("prismatic", "cylindrical")]
-    if endless := [joint.name for joint in sliding if np.isinf(joint.position_limits[-1]).any()]:
-        yield f"{quoted(endless)}: a range of ±{size:.4g} m, the size of the robot: URDF wants one, the scene has none"
-    if rotors := [joint.name for joint in joints if getattr(joint, "rotor_inertia", 0.0)]:
-        yield f"{quoted(rotors)}: rotor_inertia and compliance of gears left out"
-    if powers := [joint.name for joint in joints if any(np.isfinite(each.power) for each in joint.motor_limits)]:
-        yield f"{quoted(powers)}: power_limit left out"
-    moving = [joint for joint in joints if isinstance(joint, MovingJoint)]
-    if smooth := [joint.name for joint in moving if "friction_speed" in joint.model_fields_set]:
-        yield f"{quoted(smooth)}: friction_speed left out"
-    several = [joint for joint in moving if len(joint.units) > 2 and (joint.motor_limits or joint.frictions)]
-    if lost := [joint.name for joint in several if joint.model_fields_set & LIMITS]:
-        yield f"{quoted(lost)}: limits and friction of a planar joint left out"
+    range_of = f"a range of ±{size:.4g} m, the size of the robot: URDF wants one, the scene has none"
+    of = dict[str, list[str]]()
+    for joint in (node.joint for node in tree.nodes):
+        is_sliding, keys = joint.type in ("prismatic", "cylindrical"), joint.model_fields_set
+        is_planar = len(joint.units) > 2 and (joint.motor_limits or joint.frictions)
+        for text, holds in {
+            range_of: is_sliding and np.isinf(joint.position_limits[-1]).any(),
+            "rotor_inertia and compliance of gears left out": getattr(joint, "rotor_inertia", 0.0),
+            "power_limit left out": any(np.isfinite(each.power) for each in joint.motor_limits),
+            "friction_speed left out": "friction_speed" in keys,
+            "limits and friction of a planar joint left out": is_planar and keys & LIMITS,
+        }.items():
+            if holds:
+                of.setdefault(text, []).append(joint.name)
+    yield from (f"{quoted(names)}: {text}" for text, names in of.items())
 
 
 def scene_as_urdf(path: Path) -> tuple[str, str, tuple[str, ...]]:

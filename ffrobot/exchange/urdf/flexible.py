@@ -4,8 +4,6 @@ The x axis of the link goes from the joint that carries it to the one beyond (th
 along the axis of the carrying joint as far as that is square to x, so that "in-plane" is the plane in which it swings.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -55,7 +53,7 @@ def flexible_link(robot: Robot, name: str, source: Path, folder: Path, stem: str
     if not isinstance(geometry, dict):
         raise InputError(f"{source}: expected a link file", "no [geometry]")
     beyond = robot.joints_of(name)
-    tip = max(beyond, key=lambda joint: float(np.linalg.norm(joint.origin.xyz)), default=None)
+    tip = max(beyond, key=lambda joint: joint.way, default=None)
     axes, remarks = _axes(robot, name, tip), list[str]()
     place = Place(np.zeros(3), axes.T)
     length = _set_length(geometry, tip, name, source, remarks)
@@ -100,16 +98,12 @@ def _set_length(geometry: dict[str, Any], tip: UrdfJoint | None, name: str, sour
                 f'{source}: geometry.length: expected it of "{shown(name)}", which carries no further joint'
             )
         return float(given)
-    wanted = float(np.linalg.norm(tip.origin.xyz))
+    wanted, distance = tip.way, f"{tip.way:.9g} m, the distance to {tip.label}"
     if given is None:
         geometry["length"] = wanted
-        remarks.append(f'length {wanted:.9g} m, the distance to joint "{shown(tip.name)}"')
+        remarks.append(f"length {distance}")
     elif not isinstance(given, int | float) or abs(given - wanted) > 1e-6 * wanted:  # relative
-        raise InputError(
-            f'{source}: geometry.length: expected {wanted:.9g} m, the distance to joint "{shown(tip.name)}", or no'
-            " such key",
-            f"{given!r}",
-        )
+        raise InputError(f"{source}: geometry.length: expected {distance}, or no such key", f"{given!r}")
     return wanted
 
 
@@ -145,6 +139,15 @@ def _interfaces(
     return point_of
 
 
+@struct
+class JointAxis:
+    """A joint of the link: its `name`, `point` (3,), m, and `direction` (3,) in axes of the link file."""
+
+    name: str
+    point: Array
+    direction: Array
+
+
 def _axes_of_joints(robot: Robot, name: str, point_of: Mapping[str, str], place: Place) -> dict[str, JointAxis]:
     axes = dict[str, JointAxis]()
     for joint in robot.joints.values():
@@ -177,15 +180,6 @@ def _in_bores(keys: dict[str, Any], part: Path, joints: Mapping[str, JointAxis],
 PARALLEL = 1e-4  # 1 − cosine between the axes of a bore and of its joint
 CONCENTRIC = 0.05  # of the radius: how far the joint may be from the axis of the bore
 CENTERED = 1e-6  # of the length: how far the center of the bore is from the joint without a remark
-
-
-@struct
-class JointAxis:
-    """A joint of the link: its `name`, `point` (3,), m, and `direction` (3,) in axes of the link file."""
-
-    name: str
-    point: Array
-    direction: Array
 
 
 def _bores_at(

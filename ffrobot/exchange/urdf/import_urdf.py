@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...common.errors import FfrobotError, InputError, of_file
+from ...common.errors import FfrobotError, InputError, naming, of_file, refuse
 from ...common.files import check_folder, holds, write_atomically
 from ...common.structs import struct
 from ...common.tables import beyond_limits, shown
@@ -16,8 +16,8 @@ from ...fe_models.link import cached_modal_body
 from ...fe_models.link_source import LinkTable
 from ...mbs.model.body import from_modal_body
 from .flexible import ImportedLink, flexible_link
-from .robot import MASSLESS, Inertial, MeshFile, Names, Robot, inertial_of, lines_of, read_urdf
-from .scene import SceneOfRobot, is_possible, mechanism
+from .robot import MASSLESS, Inertial, MeshFile, Names, Robot, inertial_of, read_urdf
+from .scene import SceneOfRobot, is_possible
 from .shape_masses import Filling, MeshMass, mesh_masses, mesh_path, with_masses, without_mass
 
 SAME = 1e-9  # relative: less is round-off
@@ -80,18 +80,17 @@ TURNS = 4 * np.pi  # rad: limits of joints that turn are within; a full turn in 
 
 
 def _remarks_on_scale(robot: Robot) -> Iterator[str]:
-    ways = {joint.name: float(np.linalg.norm(joint.origin.xyz)) for joint in robot.joints.values()}
-    reach = sum(ways.values())
-    longest, name = max(((way, name) for name, way in ways.items()), default=(0.0, ""))
-    if longest > LONGEST:
+    joints = robot.joints.values()
+    reach, longest = sum(joint.way for joint in joints), max(joints, key=lambda joint: joint.way, default=None)
+    if longest is not None and longest.way > LONGEST:
         yield (
-            f'joint "{shown(name)}" is {longest:g} m from that of its parent: URDF is in meters; is this file in'
+            f"{longest.label} is {longest.way:g} m from that of its parent: URDF is in meters; is this file in"
             " millimeters?"
         )
-    for joint in robot.joints.values():
-        label, limits = f'joint "{shown(joint.name)}"', [joint.limits.get(key, 0.0) for key in ("lower", "upper")]
-        if joint.type == "revolute" and max(map(abs, limits)) > TURNS:
-            yield f"{label}: limits {limits[0]:g} … {limits[1]:g} rad are many turns: are they in degrees?"
+    for joint in joints:
+        low, high = (joint.limits.get(key, 0.0) for key in ("lower", "upper"))
+        if joint.type == "revolute" and max(abs(low), abs(high)) > TURNS:
+            yield f"{joint.label}: limits {low:g} … {high:g} rad are many turns: are they in degrees?"
     if 0 < reach < SHORTEST:
         yield f"all joints are within {reach:g} m: URDF is in meters; is this file in kilometers?"
     for link in robot.links.values():
@@ -104,7 +103,7 @@ def _remarks_on_scale(robot: Robot) -> Iterator[str]:
                 f"{label}: radius of gyration {gyration:.3g} m, in a robot whose joints span"
                 f" {reach:.3g} m: URDF is in kg m²; is this inertia in another unit, or a placeholder?"
             )
-        beside = [ways[joint.name] for joint in robot.joints.values() if link.name in (joint.parent, joint.child)]
+        beside = [joint.way for joint in joints if link.name in (joint.parent, joint.child)]
         away = float(np.linalg.norm(part.center))
         if away > FAR * max(beside, default=np.inf) and away > APART * gyration:
             yield (
@@ -159,7 +158,7 @@ def import_urdf(
         folder: DIR.
         flexible: link files by link.
         force: replace files that are there.
-        fix_inertia: see `mechanism`.
+        fix_inertia: see `SceneOfRobot`.
         filling: fills the shapes of links without mass; None leaves them massless.
         keep_rest: what a link of the URDF weighs beyond its flexible link becomes a payload on that one.
 
@@ -177,11 +176,9 @@ def import_urdf(
         shapes = (shape for link in robot.links.values() for shape in link.visual)
         paths = {shape.filename: mesh_path(shape.filename, urdf) for shape in shapes if isinstance(shape, MeshFile)}
         meshes = {name: os.path.relpath(path, folder.resolve()) for name, path in paths.items() if path is not None}
-        with lines_of(urdf):
-            bodies = mechanism(robot, {name: link.place for name, link in links.items()}, fix_inertia=fix_inertia)
-            scene = SceneOfRobot(robot, bodies, links, meshes)
-            if beyond := list(beyond_limits(dict(scene.keys))):
-                raise InputError("\n".join(beyond))
+        with naming(urdf):
+            scene = SceneOfRobot(robot, links, meshes, fix_inertia=fix_inertia)
+            refuse(beyond_limits(dict(scene.keys)))
         masses, about_meshes = mesh_masses(robot, urdf)
         remarks += scene.remarks
         for link in links.values():

@@ -9,7 +9,6 @@ import math
 import re
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import field
 from pathlib import Path
 from typing import Literal
@@ -18,8 +17,8 @@ from xml.parsers import expat
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
-from ...common.errors import InputError, check_known, quoted
+from ...common.arrays import Array
+from ...common.errors import InputError, check_known, naming, quoted
 from ...common.keys import LONGEST_NAME
 from ...common.rotations import of_quaternion, of_rpy, point_inertia, rpy_of
 from ...common.structs import struct
@@ -85,7 +84,7 @@ class Inertial:
         mass = self.mass + other.mass
         if mass == 0.0:
             return Inertial(0.0, self.center, self.inertia + other.inertia)
-        center = as_floats((self.mass * self.center + other.mass * other.center) / mass)
+        center = (self.mass * self.center + other.mass * other.center) / mass
         inertia = self.inertia + other.inertia
         for part in (self, other):
             inertia = inertia + point_inertia(part.mass, part.center - center)
@@ -163,6 +162,16 @@ class UrdfJoint:
     dynamics: Mapping[str, float] = field(default_factory=dict)
     mimic: Mimic | None = None
 
+    @property
+    def label(self) -> str:
+        """Its name, for messages."""
+        return f'joint "{shown(self.name)}"'
+
+    @property
+    def way(self) -> float:
+        """Distance from the frame of its parent, m."""
+        return float(np.linalg.norm(self.origin.xyz))
+
 
 @struct
 class Robot:
@@ -236,7 +245,7 @@ def read_urdf(path: Path) -> Robot:
     Raises:
         InputError: it cannot be read, is no URDF, an element or number is missing or wrong, links do not form one tree.
     """
-    with lines_of(path):
+    with naming(path):
         root = _root_element(read_bytes(path, "URDF file"))
         links = [_link(each) for each in root.findall("link")]
         joints = [_joint(each) for each in root.findall("joint")]
@@ -248,17 +257,6 @@ def read_urdf(path: Path) -> Robot:
         base = _root_of([link.name for link in links], joints)
         odd = (*_turned(root), *_repeated(root), *_not_read(root))
         return Robot(root.get("name", "").strip() or base, {link.name: link for link in links}, by_name, base, odd)
-
-
-@contextmanager
-def lines_of(path: Path) -> Iterator[None]:
-    """Have each line of an `InputError` begin with the file, unless it does already."""
-    try:
-        yield
-    except InputError as error:
-        if str(error).startswith(f"{path}:"):
-            raise
-        raise InputError("\n".join(f"{path}: {line}" for line in str(error).splitlines())) from None
 
 
 def _root_element(content: bytes) -> Element:
@@ -296,7 +294,7 @@ def _turned(root: Element) -> Iterable[str]:
         rpy = (0.0, 0.0, 0.0) if turned is None else _origin(turned, each.tag).rpy
         if max(map(abs, rpy)) > 2 * math.pi:
             angles = " ".join(f"{angle:g}" for angle in rpy)
-            yield f'{each.tag} "{shown(_name(each))}": rpy {angles} is more than a turn: URDF has rad, not degrees'
+            yield f"{_label(each)}: rpy {angles} is more than a turn: URDF has rad, not degrees"
 
 
 def _repeated(root: Element) -> Iterable[str]:
@@ -306,8 +304,7 @@ def _repeated(root: Element) -> Iterable[str]:
             inside = "" if part is each else " in <inertial>"
             for tag, count in Counter(child.tag for child in part if child.tag in ONCE).items():
                 if count > 1:
-                    label = f'{each.tag} "{shown(_name(each))}"'
-                    yield f"{label}: {count} <{tag}>{inside}: the first counts, the others do not"
+                    yield f"{_label(each)}: {count} <{tag}>{inside}: the first counts, the others do not"
 
 
 def _not_read(root: Element) -> Iterator[str]:
@@ -369,11 +366,16 @@ def _name(element: Element) -> str:
     return name
 
 
+def _label(element: Element) -> str:
+    return f'{element.tag} "{shown(_name(element))}"'
+
+
 def _link(element: Element) -> UrdfLink:
-    name = _name(element)
-    label, part = f'link "{shown(name)}"', element.find("inertial")
+    label, part = _label(element), element.find("inertial")
     inertial = None if part is None else _inertial(part, f"{label}: <inertial>")
-    return UrdfLink(name, inertial, *(tuple(_shapes(element, kind, label)) for kind in ("visual", "collision")))
+    return UrdfLink(
+        _name(element), inertial, *(tuple(_shapes(element, kind, label)) for kind in ("visual", "collision"))
+    )
 
 
 def _inertial(element: Element, label: str) -> Inertial:
@@ -397,8 +399,8 @@ def _shapes(link: Element, kind: str, label: str) -> Iterable[MeshFile | Primiti
         where = f"{label}: <{kind}>"
         for geometry in element.iterfind("geometry/*"):
             if geometry.tag == "mesh" and (filename := geometry.get("filename")):
-                scale = three(_numbers(geometry, "scale", (1.0, 1.0, 1.0), f"{where}: <mesh>"))
-                yield MeshFile(filename, scale, _origin(element, where))
+                scale = _numbers(geometry, "scale", f"{where}: <mesh>", "1 1 1")
+                yield MeshFile(filename, three(scale), _origin(element, where))
             for shape, counts in SIZES.items():
                 if geometry.tag == shape:
                     sizes = (size for key, count in counts.items() for size in _sizes(geometry, key, count))
@@ -415,16 +417,14 @@ def _sizes(shape: Element, key: str, count: int) -> tuple[float, ...]:
 
 
 def _joint(element: Element) -> UrdfJoint:
-    name = _name(element)
-    label = f'joint "{shown(name)}"'
-    kind = element.get("type", "")
+    label, kind = _label(element), element.get("type", "")
     check_known(kind, TYPES, f"{label}: type: expected one of {quoted(TYPES)}")
     axis = element.find("axis")
-    along = (1.0, 0.0, 0.0) if axis is None else three(_numbers(axis, "xyz", (1.0, 0.0, 0.0), f"{label}: <axis>"))
+    along = (1.0, 0.0, 0.0) if axis is None else three(_numbers(axis, "xyz", f"{label}: <axis>", "1 0 0"))
     if not any(along) and kind in ("revolute", "continuous", "prismatic", "planar"):
         raise InputError(f"{label}: <axis>: expected a direction", "0 0 0")
     return UrdfJoint(
-        name=name,
+        name=_name(element),
         type=kind,
         parent=_end(element, "parent", label),
         child=_end(element, "child", label),
@@ -448,7 +448,7 @@ def _mimic(element: Element | None, label: str) -> Mimic | None:
         return None
     if not (name := element.get("joint", "")):
         raise InputError(f"{label}: expected the attribute joint", "none")
-    return Mimic(name, _number(element, "multiplier", label, 1.0), _number(element, "offset", label, 0.0))
+    return Mimic(name, _number(element, "multiplier", label, "1"), _number(element, "offset", label, "0"))
 
 
 def _attributes(joint: Element, tag: str, label: str) -> dict[str, float]:
@@ -463,12 +463,12 @@ def _origin(element: Element, label: str) -> Origin:
     if origin is None:
         return Origin()
     where = f"{label}: <origin>"
-    xyz = three(_numbers(origin, "xyz", (0.0, 0.0, 0.0), where))
+    xyz = three(_numbers(origin, "xyz", where))
     if origin.get("quat_xyzw") is None:
-        return Origin(xyz, three(_numbers(origin, "rpy", (0.0, 0.0, 0.0), where)))
+        return Origin(xyz, three(_numbers(origin, "rpy", where)))
     if origin.get("rpy") is not None:  # URDF 1.1 has it or a quaternion, scalar last
         raise InputError(f"{where}: expected rpy or quat_xyzw", "both")
-    *vector, scalar = _numbers(origin, "quat_xyzw", (0.0, 0.0, 0.0, 1.0), where)
+    *vector, scalar = _numbers(origin, "quat_xyzw", where, "0 0 0 1")
     e = np.array([scalar, *vector])
     size = float(np.linalg.norm(e))
     if abs(size - 1.0) > 0.1:  # less is few digits
@@ -476,24 +476,18 @@ def _origin(element: Element, label: str) -> Origin:
     return Origin(xyz, three(rpy_of(of_quaternion(e / size))))
 
 
-def _number(element: Element, key: str, label: str, default: float | None = None) -> float:
-    text = element.get(key)
-    if text is None:
-        if default is None:
-            raise InputError(f"{label}: expected the attribute {key}", "none")
-        return default
+def _number(element: Element, key: str, label: str, default: str | None = None) -> float:
+    if (text := element.get(key, default)) is None:
+        raise InputError(f"{label}: expected the attribute {key}", "none")
     return _finite(text, f"{label}: {key}")
 
 
-def _numbers(element: Element, key: str, default: tuple[float, ...], label: str) -> tuple[float, ...]:
+def _numbers(element: Element, key: str, label: str, default: str = "0 0 0") -> list[float]:
     """As many as `default` has, which stands for a missing attribute."""
-    text = element.get(key)
-    if text is None:
-        return default
-    parts = text.split()
-    if len(parts) != len(default):
-        raise InputError(f"{label}: {key}: expected {len(default)} numbers", f'"{shown(text)}"')
-    return tuple(_finite(part, f"{label}: {key}") for part in parts)
+    text, count = element.get(key, default), len(default.split())
+    if len(parts := text.split()) != count:
+        raise InputError(f"{label}: {key}: expected {count} numbers", f'"{shown(text)}"')
+    return [_finite(part, f"{label}: {key}") for part in parts]
 
 
 def _finite(text: str, label: str) -> float:
@@ -514,12 +508,11 @@ def _root_of(links: Sequence[str], joints: Sequence[UrdfJoint]) -> str:
         raise InputError("expected at least one <link>", "none")
     carried = dict[str, str]()
     for joint in joints:
-        label = f'joint "{shown(joint.name)}"'
         for kind, name in (("parent", joint.parent), ("child", joint.child)):
-            check_known(name, links, f"{label}: <{kind}>: expected a link of the file")
+            check_known(name, links, f"{joint.label}: <{kind}>: expected a link of the file")
         if joint.child in carried:
             raise InputError(
-                f'{label}: expected one joint that carries link "{shown(joint.child)}"',
+                f'{joint.label}: expected one joint that carries link "{shown(joint.child)}"',
                 f'a second one, "{shown(carried[joint.child])}" being the first: URDF has trees only; close the loop'
                 " in the scene",
             )
@@ -541,7 +534,7 @@ def _root_of(links: Sequence[str], joints: Sequence[UrdfJoint]) -> str:
 
 def _check_mimics(joints: Mapping[str, UrdfJoint]) -> None:
     for joint in joints.values():
-        label, chain = f'joint "{shown(joint.name)}": <mimic>', [joint.name]
+        label, chain = f"{joint.label}: <mimic>", [joint.name]
         while (follows := joints[chain[-1]].mimic) is not None:
             check_known(follows.joint, joints, f"{label}: expected a joint of the file")
             if follows.joint in chain:

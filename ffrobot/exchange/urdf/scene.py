@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from ...common.arrays import Array, as_rows
-from ...common.errors import InputError, quoted
+from ...common.errors import InputError, quoted, refuse
 from ...common.rotations import rpy_of
-from ...common.structs import struct
 from ...common.tables import shown
 from ...mbs.fields.field_types import GROUND
 from ...mbs.scene.bodies import ROUND_OFF, check_inertia
@@ -45,32 +44,18 @@ class MergedLinks:
         return f'link "{shown(self.top)}"' + (f" with {quoted(fixed)} fixed to it" if fixed else "")
 
 
-@struct
-class Mechanism:
-    """Bodies in the order in which joints carry them, and these joints, each from one body to the next.
+def _mechanism(
+    robot: Robot, flexible: Mapping[str, Place], fix_inertia: bool
+) -> tuple[list[MergedLinks], list[UrdfJoint], dict[str, MergedLinks], list[str]]:
+    """Bodies in the order in which joints carry them, these joints, the body of each link, and what was left out.
 
-    `body_of` has the body of each link; `remarks` say what was left out.
-    """
-
-    bodies: tuple[MergedLinks, ...]
-    joints: tuple[UrdfJoint, ...]
-    body_of: Mapping[str, MergedLinks]
-    remarks: tuple[str, ...]
-
-
-def mechanism(robot: Robot, flexible: Mapping[str, Place], *, fix_inertia: bool = False) -> Mechanism:
-    """The bodies of a robot.
-
-    `flexible` has the links that shall be flexible, and where their URDF frame stands in the axes of the link file. By
-    `fix_inertia` principal moments that no body has are changed, as little as can be: see `least_change`.
-
-    Raises:
-        InputError: a body that moves has no mass but carries others, or an inertia that no body has.
+    `flexible` has the links that shall be flexible, and where their URDF frame stands in the axes of the link file.
     """
     ground = MergedLinks(robot.root, stands_still=True)
     bodies, joints, body_of = [ground], list[UrdfJoint](), dict[str, MergedLinks]()
     if robot.root in flexible:
-        joints.append(UrdfJoint(f"{robot.root}_fixed", "fixed", "", robot.root))  # the parent is no link
+        ground.members[""], body_of[""] = HERE, ground  # no link has this name
+        joints.append(UrdfJoint(f"{robot.root}_fixed", "fixed", "", robot.root))
         bodies.append(_start(robot, robot.root, flexible, body_of))
     else:
         ground.add(robot, robot.root, HERE)
@@ -95,8 +80,8 @@ def mechanism(robot: Robot, flexible: Mapping[str, Place], *, fix_inertia: bool 
             " or a data sheet, take a description of the robot for dynamics, or estimate masses by --density",
         )
     remarks += _fixed(kept) if fix_inertia else []
-    _check_inertias(kept)
-    return Mechanism(tuple(kept), tuple(carried), body_of, tuple(remarks))
+    refuse(_wrong_inertias(kept))
+    return kept, carried, body_of, remarks
 
 
 def _start(robot: Robot, link: str, flexible: Mapping[str, Place], body_of: dict[str, MergedLinks]) -> MergedLinks:
@@ -112,20 +97,17 @@ def _with_mass(
     """Without bodies beyond which nothing has mass: frames of tools and sensors on joints of their own."""
     below = {body for body in bodies if body.weighs}
     for joint in reversed(joints):
-        if joint.parent in body_of and body_of[joint.child] in below:
+        if body_of[joint.child] in below:
             below.add(body_of[joint.parent])
     kept = [body for body in bodies if not body.stands_still and body in below]
-    bare = [body for body in kept if not body.weighs]
-    if bare:
-        raise InputError(
-            "\n".join(
-                f"{body.label}: expected a mass of a body that moves and carries others, found none: give it an"
-                " <inertial>, make the joint that carries it fixed, or estimate masses by --density"
-                for body in bare
-            )
-        )
+    refuse(
+        f"{body.label}: expected a mass of a body that moves and carries others, found none: give it an <inertial>,"
+        " make the joint that carries it fixed, or estimate masses by --density"
+        for body in kept
+        if not body.weighs
+    )
     remarks = [
-        f'joint "{shown(joint.name)}" and link "{shown(joint.child)}" left out: nothing there has mass'
+        f'{joint.label} and link "{shown(joint.child)}" left out: nothing there has mass'
         for joint in joints
         if body_of[joint.child] not in below
     ]
@@ -168,8 +150,7 @@ def is_possible(inertia: Array) -> bool:
     return bool(moments[2] <= moments[0] + moments[1] + ROUND_OFF * np.abs(inertia).max())
 
 
-def _check_inertias(bodies: list[MergedLinks]) -> None:
-    errors = []
+def _wrong_inertias(bodies: list[MergedLinks]) -> Iterator[str]:
     for body in bodies:
         if body.flexible:
             continue
@@ -180,9 +161,7 @@ def _check_inertias(bodies: list[MergedLinks]) -> None:
             least, _, largest = np.linalg.eigvalsh(least_change(body.inertial.inertia))
             is_mended = not is_possible(body.inertial.inertia) and least >= -ROUND_OFF * largest
             way = ": --fix-inertia makes the least change" if is_mended else ""
-            errors.append(f"{body.label}: <inertia>: {error}{way}")
-    if errors:
-        raise InputError("\n".join(errors))
+            yield f"{body.label}: <inertia>: {error}{way}"
 
 
 GRAVITY = [0.0, 0.0, -9.81]
@@ -202,28 +181,33 @@ ORIGIN = "origin"  # point of a rigid body where the joint that carries it is
 class SceneOfRobot:
     """Scene made from a URDF: `keys` of the file, and `remarks` on what it could not keep.
 
-    `meshes` are files from the folder of the scene on, by the names that the URDF has for them.
+    `meshes` are files from the folder of the scene on, by the names that the URDF has for them. By `fix_inertia`
+    principal moments that no body has are changed, as little as can be: see `least_change`.
+
+    Raises:
+        InputError: a body that moves has no mass but carries others, or an inertia that no body has.
     """
 
     def __init__(
-        self, robot: Robot, mechanism: Mechanism, flexible: Mapping[str, ImportedLink], meshes: Mapping[str, str]
+        self, robot: Robot, flexible: Mapping[str, ImportedLink], meshes: Mapping[str, str], *, fix_inertia: bool
     ) -> None:
-        self.robot, self.mechanism, self.flexible, self.meshes = robot, mechanism, flexible, meshes
-        self.remarks = [*robot.remarks, *mechanism.remarks]
+        self.robot, self.flexible, self.meshes = robot, flexible, meshes
+        places = {name: link.place for name, link in flexible.items()}
+        merged, self.carrying, self.body_of, left_out = _mechanism(robot, places, fix_inertia)
+        self.remarks = [*robot.remarks, *left_out]
         self.bodies, self.joints = Names((GROUND,)), Names()
-        self.points = {body.top: Names((ORIGIN,)) for body in mechanism.bodies}
-        joints = [self._joint(joint) for joint in mechanism.joints]  # first: they name points
+        self.points = {body.top: Names((ORIGIN,)) for body in merged}
+        joints = [self._joint(joint) for joint in self.carrying]  # first: they name points
         self.keys: dict[str, Any] = {
             "name": " ".join("".join(c if c.isprintable() else " " for c in robot.name).split())[:100] or "robot",
             "space": "spatial",
             "gravity": GRAVITY,
-            "body": [self._body(body) for body in mechanism.bodies],
+            "body": [self._body(body) for body in merged],
             "joint": joints,
         }
-        if tools := [self._tool(body, link) for body in mechanism.bodies for link in self._tools(body)]:
+        if tools := [self._tool(body, link) for body in merged for link in self._tools(body)]:
             self.keys["tool"] = tools
-        still = [name for name, body in mechanism.body_of.items() if body.stands_still]
-        if still:
+        if still := [name for name in robot.links if self.body_of[name].stands_still]:
             mass = sum(inertial.mass for name in still if (inertial := robot.links[name].inertial) is not None)
             said = "are fixed to the ground and are" if len(still) > 1 else "is fixed to the ground and is"
             self.remarks.append(f"{quoted(map(shown, still))} (mass {mass:g} kg) {said} no body of the scene")
@@ -236,8 +220,8 @@ class SceneOfRobot:
             return {"name": name, "link": self.flexible[body.top].file_name}
         points = {ORIGIN: [0.0, 0.0, 0.0]}
         of_body = self.points[body.top]
-        for joint in self.mechanism.joints:
-            if self.mechanism.body_of.get(joint.parent) is body:
+        for joint in self.carrying:
+            if self.body_of[joint.parent] is body:
                 points[of_body[joint.name]] = _numbers((body.members[joint.parent] @ joint.origin.place).d)
         for link, place in body.members.items():  # frames of tools and sensors keep their names
             if link != body.top and link not in self._tools(body):
@@ -256,7 +240,7 @@ class SceneOfRobot:
 
     def _tools(self, body: MergedLinks) -> list[str]:
         """Links of a rigid body that carries no other: its frames with axes of their own, ends of fixed joints."""
-        carries = any(self.mechanism.body_of.get(joint.parent) is body for joint in self.mechanism.joints)
+        carries = any(self.body_of[joint.parent] is body for joint in self.carrying)
         if carries or body.flexible or body.stands_still:
             return []
         return [
@@ -295,11 +279,11 @@ class SceneOfRobot:
                 yield keys
 
     def _joint(self, joint: UrdfJoint) -> dict[str, Any]:
-        parent, child = self.mechanism.body_of.get(joint.parent), self.mechanism.body_of[joint.child]
-        place = joint.origin.place if parent is None else parent.members[joint.parent] @ joint.origin.place
+        parent, child = (self.body_of[link] for link in (joint.parent, joint.child))
+        place = parent.members[joint.parent] @ joint.origin.place
         keys: dict[str, Any] = {"name": self.joints[joint.name], "type": SCENE_TYPE[joint.type]}
         keys["between"] = [GROUND, f"{self.bodies[child.top]}.{'root' if child.flexible else ORIGIN}"]
-        if parent is not None and not parent.stands_still:
+        if not parent.stands_still:
             name, top = joint.name, parent.top
             point = self.flexible[top].point_of[name] if parent.flexible else self.points[top][name]
             keys["between"][0] = f"{self.bodies[top]}.{point}"
@@ -308,7 +292,7 @@ class SceneOfRobot:
         if joint.type in WITH_AXIS:
             keys["axis"] = _numbers(place.C @ np.array(joint.axis))
         # The URDF's own numbers where nothing is merged in between.
-        is_plain = parent is None or (parent.members[joint.parent] is HERE and child.members[joint.child] is HERE)
+        is_plain = parent.members[joint.parent] is HERE and child.members[joint.child] is HERE
         rpy = list(joint.origin.rpy) if is_plain else rpy_of(place.C @ child.members[joint.child].C.T)
         if any(rpy):
             keys["rpy"] = rpy
@@ -317,7 +301,7 @@ class SceneOfRobot:
 
     def _limits(self, joint: UrdfJoint) -> dict[str, Any]:
         keys: dict[str, Any] = {}
-        label, limits = f'joint "{shown(joint.name)}"', dict(joint.limits)
+        label, limits = joint.label, dict(joint.limits)
         if joint.type == "continuous":
             limits = {key: value for key, value in limits.items() if key in ("effort", "velocity")}
         if joint.type not in SINGLE:
@@ -341,26 +325,25 @@ class SceneOfRobot:
     def _remark_on_mimic(self, joint: UrdfJoint) -> None:
         if (mimic := joint.mimic) is None:
             return
-        leader, name = self.robot.joints[mimic.joint], f'joint "{shown(joint.name)}"'
+        leader, follows = self.robot.joints[mimic.joint], f'{joint.label} follows "{shown(mimic.joint)}"'
         if leader.type == "fixed":
             self.remarks.append(
-                f'{name} follows "{shown(mimic.joint)}", which is fixed: its position is {mimic.offset:g}; give it a'
-                " trajectory of that value"
+                f"{follows}, which is fixed: its position is {mimic.offset:g}; give it a trajectory of that value"
             )
-        elif leader not in self.mechanism.joints:
-            self.remarks.append(f'{name} follows "{shown(mimic.joint)}", which is left out: give it its own trajectory')
+        elif leader not in self.carrying:
+            self.remarks.append(f"{follows}, which is left out: give it its own trajectory")
         else:
             self.remarks.append(
-                f'{name} follows "{shown(mimic.joint)}": give it a separate trajectory,'
-                f" {mimic.multiplier:g} times that one plus {mimic.offset:g}; the motor of that one then has to supply"
-                f" {mimic.multiplier:g} times this one's torque in addition to its own"
+                f"{follows}: give it a separate trajectory, {mimic.multiplier:g} times that one plus {mimic.offset:g};"
+                f" the motor of that one then has to supply {mimic.multiplier:g} times this one's torque in addition to"
+                " its own"
             )
 
     def _friction(self, joint: UrdfJoint) -> dict[str, Any]:
         keys: dict[str, Any] = {}
         for key, ours in (("damping", "viscous_friction"), ("friction", "coulomb_friction")):
             value = joint.dynamics.get(key, 0.0)
-            label = f'joint "{shown(joint.name)}": {key} {value:g} left out'
+            label = f"{joint.label}: {key} {value:g} left out"
             if value < 0:
                 self.remarks.append(f"{label}: expected a value ≥ 0")
             elif value and joint.type not in SINGLE:

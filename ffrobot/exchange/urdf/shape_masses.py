@@ -35,8 +35,9 @@ class MeshMass:
     """Comparison of the mesh of a link with its <inertial>; SI units."""
 
     link: str
+    mass: float  # of <inertial>, kg
     volume: float  # m³
-    density: float  # that gives the mass of <inertial>, kg/m³
+    density: float  # that gives this mass, kg/m³
     inertia_ratio: float  # trace of the filled mesh's inertia about its center over that of <inertial>
     center_distance: float  # of the two centers, m
     is_closed: bool  # whether the mesh encloses a volume at all
@@ -64,12 +65,12 @@ def mesh_masses(robot: Robot, urdf: Path) -> tuple[list[MeshMass], list[str]]:
             continue
         mass, tiny = link.inertial.mass, np.finfo(float).tiny
         if (volume := abs(float(mesh.volume))) < tiny:
-            masses.append(MeshMass(link.name, 0.0, np.inf, np.nan, np.nan, False))
+            masses.append(MeshMass(link.name, mass, 0.0, np.inf, np.nan, np.nan, False))
             continue
         unit = mesh.moment_inertia / mesh.volume  # per unit of mass
         ratio = float(np.trace(unit) * mass / max(np.trace(link.inertial.inertia), tiny))
         distance = float(np.linalg.norm(mesh.center_mass - link.inertial.center))
-        masses.append(MeshMass(link.name, volume, mass / volume, ratio, distance, _is_closed(mesh)))
+        masses.append(MeshMass(link.name, mass, volume, mass / volume, ratio, distance, _is_closed(mesh)))
     if missing:
         more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
         remarks.append(f"mesh not found: {shown(missing[0])}{more}; masses are those of <inertial> in any case")
@@ -193,11 +194,11 @@ def _filled(robot: Robot, link: UrdfLink, urdf: Path, filling: Filling) -> tuple
                 raise InputError(f"{label}: expected a shape with a volume", f"{name} without one")
             parts.append(part)
         return reduce(add, parts), f"its <{kind}> filled {with_density}{hulls}"
-    beyond = max(robot.joints_of(link.name), key=lambda joint: float(np.linalg.norm(joint.origin.xyz)), default=None)
-    if filling.radius is None or beyond is None or not any(beyond.origin.xyz):
+    beyond = max(robot.joints_of(link.name), key=lambda joint: joint.way, default=None)
+    if filling.radius is None or beyond is None or not beyond.way:
         return None, ""
     (rod,) = bars([np.array(beyond.origin.xyz)], filling.radius)
-    what = f'a cylinder of radius {filling.radius:g} m to joint "{shown(beyond.name)}" {with_density}'
+    what = f"a cylinder of radius {filling.radius:g} m to {beyond.label} {with_density}"
     return _of_primitive(rod, filling.density), what
 
 
