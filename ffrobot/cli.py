@@ -14,8 +14,8 @@ from .commands.design import optimise, sensitivity, sweep, uncertainty
 from .commands.exchange import export, import_
 from .commands.pictures import plot, report, view
 from .commands.read import feasibility, info, linear, pose
-from .commands.robot import bench, fit, map_, smooth
 from .commands.stages import link, solve
+from .commands.studies import bench, fit, map_, smooth
 from .common.errors import FfrobotError
 from .common.interrupts import SIGNALS, EndOfCommand
 from .common.parallel import end_all, is_first

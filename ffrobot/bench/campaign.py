@@ -1,7 +1,5 @@
 """What `ffrobot bench SCENE.toml` runs, in which order, and what it writes and prints of it."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -25,7 +23,6 @@ from ..present.lines import print_table
 from ..run.watcher import Watcher
 from ..scene.load import load_scene
 from ..scene.scene import Scene
-from .axes import measure_axes
 from .precision import (
     KINDS,
     TIGHTER,
@@ -35,6 +32,7 @@ from .precision import (
     Settings,
     find_analysis,
     find_reference,
+    measure_axes,
     measure_points,
 )
 
@@ -149,13 +147,13 @@ class Campaign:
             path = folder / f"{part.replace('-', '_')}.{extension}"
             write_atomically(path, text.encode(), "record", make_folder=True)
             self.drawn([path])
-        self.console.print(title, soft_wrap=True)
+        self.console.out(title)
         print_table(self.console, *as_text(rows, self.columns[part]))
 
     def drawn(self, paths: Sequence[Path]) -> None:
         """Print the names of files written."""
         for path in paths:
-            self.console.print(str(path), soft_wrap=True)
+            self.console.out(path)
 
 
 def inputs_of(scene: Scene, bodies: Mapping[str, str]) -> dict[str, object]:

@@ -14,7 +14,7 @@ import click
 from ..common.errors import InputError, SolveError
 from ..design import studies
 from ..present.logs import logging_options, python_option, together
-from .options import F, options_of, protect, runs_options, scene_argument
+from .options import F, options_of, protect_scene, runs_options, scene_argument
 
 if TYPE_CHECKING:
     from ..batch.batch import Batch
@@ -40,9 +40,8 @@ def _study(
     Raises `SolveError` where that is not what was asked for.
     """
     from ..present.console import Display, summary_console
-    from ..run.inputs import files_of
 
-    protect(files_of(scene_file))
+    protect_scene(scene_file)
     with Display() as display:
         study = find(scene_file, *args, folder, executor=batch, watcher=display, **how)
     study.print(summary_console())
@@ -170,12 +169,11 @@ def sweep(
     parallel on one machine, mpirun and --scheduler on several. The exit code is 1 if no run completes.
     """  # noqa: D301 (click wants the backspace itself)
     from ..present.console import Display, summary_console
-    from ..run.inputs import files_of
     from ..sweep.runs import missing_columns
     from ..sweep.sweep import drop_results, forget_failures, plan_sweep, print_table, run_sweep, stale_rows
 
     folder = output or scene_file.with_suffix(".sweep")
-    protect(files_of(scene_file))
+    protect_scene(scene_file)
     plan = plan_sweep(scene_file, vary, folder, **which)
     if retry:
         forget_failures(plan)

@@ -8,7 +8,7 @@ import click
 
 from ..common.errors import InputError
 from ..present.logs import FILE, logging_options
-from .options import POSITIVE, output_option, protect
+from .options import POSITIVE, output_option, protect, reading
 
 
 @click.command(name="import")
@@ -61,27 +61,23 @@ def import_(
     from ..exchange.urdf.shape_masses import Filling
     from ..present.console import summary_console
 
-    links = _links(flexible)
-    of_urdf = links or fix_inertia or density or radius or keep_rest
-    if file.suffix.lower() in MOTIONS or file.is_dir():
-        if of_urdf:
-            raise InputError(f"{file}: expected a URDF for options other than --output and --force", "a motion")
-        protect([file])
-        print_export(import_motion(file, output, force=force), summary_console())
+    links, suffix = _links(flexible), file.suffix.lower()
+    is_motion = suffix in MOTIONS or file.is_dir()
+    if is_motion or suffix in READERS:
+        if links or fix_inertia or density or radius or keep_rest or (force and not is_motion):
+            allowed, what = ("--output and --force", "a motion") if is_motion else ("--output", "a body")
+            raise InputError(f"{file}: expected a URDF for options other than {allowed}", what)
+        protect(file)
+        made = import_motion(file, output, force=force) if is_motion else import_body(file, output)
+        print_export(made, summary_console())
         return
-    if file.suffix.lower() in READERS:
-        if of_urdf or force:
-            raise InputError(f"{file}: expected a URDF for options other than --output", "a body")
-        protect([file])
-        print_export(import_body(file, output), summary_console())
-        return
-    if instead := ELSEWHERE.get(file.suffix.lower()):
+    if instead := ELSEWHERE.get(suffix):
         raise InputError(f"{file}: expected a URDF, a body or a motion", f"none of these: {instead}")
     if radius and density is None:
         raise InputError("--radius: expected --density with it", "none")
     if keep_rest and not links:
         raise InputError("--keep-rest: expected --flexible with it", "none")
-    protect([file, *links.values()])
+    protect(file, *links.values())
     filling = None if density is None else Filling(density, radius)
     imported = import_urdf(
         file, output, links, force=force, fix_inertia=fix_inertia, filling=filling, keep_rest=keep_rest
@@ -166,7 +162,6 @@ def export(
     urdf              of a 3D scene, for viewers: links rigid, shapes simple
     fmu               of a scene: FMI 2.0, co-simulation, of a forward motion under torques and voltages
     """  # noqa: D301 (click wants the backspace itself)
-    from ..common.hdf5 import reading
     from ..exchange.export import export_file, print_export
     from ..present.console import summary_console
 

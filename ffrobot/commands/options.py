@@ -2,7 +2,8 @@
 
 import inspect
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin
@@ -91,6 +92,20 @@ def _settings(parameter: inspect.Parameter, entry: str) -> dict[str, Any]:
     return settings | {"metavar" if isinstance(one, str) else "type": one for one in about}
 
 
-def protect(paths: Iterable[Path]) -> None:
+def protect(*files: Path | None) -> None:
     """Write to none of these files as long as the command runs."""
-    click.get_current_context().with_resource(protected(paths))
+    click.get_current_context().with_resource(protected(filter(None, files)))
+
+
+def protect_scene(file: Path, *others: Path | None) -> None:
+    """Likewise, nor to the files that a scene or link names."""
+    from ..run.inputs import files_of
+
+    protect(*files_of(file), *others)
+
+
+def reading(*files: Path) -> AbstractContextManager[None]:
+    """As `common.hdf5.reading`, which is loaded when it is needed."""
+    from ..common import hdf5
+
+    return hdf5.reading(*files)

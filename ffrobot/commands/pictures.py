@@ -11,7 +11,7 @@ from ..common.errors import InputError
 from ..common.outputs import protected
 from ..design.studies import FiniteRange
 from ..present.logs import FILE, together
-from .options import output_option
+from .options import output_option, reading
 
 MOST = 100_000  # frames of a view
 
@@ -42,7 +42,6 @@ def plot(
     A file figures.toml next to the results selects the figures; default: the main ones of the standard figures. With
     --movie, a movie of the motion instead.
     """
-    from ..common.hdf5 import reading
     from ..pictures.figures.movie import write_motion
     from ..pictures.figures.plot import plot_file
     from ..pictures.movie_file import MovieOptions
@@ -73,7 +72,6 @@ def view(file: Path, output: Path | None, movie: Path | None, seconds: float, **
     Of a modal body file, the link with its mode shapes; of a results file, the moving and deforming bodies. With
     --movie, a movie by PyVista instead.
     """
-    from ..common.hdf5 import reading
     from ..pictures.movie_file import MovieOptions
     from ..pictures.view import Options, view_file, view_movie
 
@@ -103,7 +101,6 @@ def report(results_files: tuple[Path, ...], output: Path | None) -> None:
     Several results files are compared side by side. Folders of sensitivity, optimize and uncertainty add their
     diagrams: tornado diagrams, designs of a search, bands, rankings. The page needs no network and no other file.
     """
-    from ..common.hdf5 import reading
     from ..pictures.report import write_report
     from ..pictures.studies.study import study_files
 

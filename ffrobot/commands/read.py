@@ -5,14 +5,13 @@ from pathlib import Path
 import click
 
 from ..present.logs import FILE, logging_options, python_option
-from .options import output_option, protect, scene_argument
+from .options import output_option, protect_scene, reading, scene_argument
 
 
 @click.command()
 @click.argument("file", metavar="FILE.h5", type=FILE)
 def info(file: Path) -> None:
     """List the contents of a modal body file or a results file."""
-    from ..common.hdf5 import reading
     from ..present.info import describe
 
     with reading(file):
@@ -28,7 +27,6 @@ def feasibility(results_file: Path, analysis: str | None, catalog: Path | None) 
 
     With a catalog: motors and gears that can do it, for each joint.
     """
-    from ..common.hdf5 import reading
     from ..present.console import summary_console
     from ..present.feasibility import feasibility_tables, print_motor_choice
 
@@ -45,7 +43,6 @@ def feasibility(results_file: Path, analysis: str | None, catalog: Path | None) 
 @output_option("FILE.npz|FILE.mat", "Output file [RESULTS.npz].")
 def linear(results_file: Path, analysis: str | None, output: Path | None) -> None:
     """Export a linear model, or the controllers of closed-loop control: matrices A, B, C, D and their names."""
-    from ..common.hdf5 import reading
     from ..results.file import Results
 
     path = output or results_file.with_suffix(".npz")
@@ -63,8 +60,7 @@ def pose(scene_file: Path) -> None:
     """Print the posture in which a scene starts, and the other ones that reach the same places (elbow, wrist)."""
     from ..present.console import Display, summary_console
     from ..present.start_postures import print_start
-    from ..run.inputs import files_of
 
-    protect(files_of(scene_file))
+    protect_scene(scene_file)
     with Display() as display:
         print_start(scene_file, display, summary_console())

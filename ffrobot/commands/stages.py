@@ -11,7 +11,7 @@ from ..common.errors import InputError, SolveError
 from ..common.files import check_new_file, write_atomically
 from ..common.parallel import is_first
 from ..present.logs import FILE, VERBOSE, logging_options, python_option
-from .options import POSITIVE, output_option, protect, scene_argument
+from .options import POSITIVE, output_option, protect, protect_scene, scene_argument
 
 if TYPE_CHECKING:
     from ..mesh.inspection import Unit
@@ -47,9 +47,8 @@ def link(
     from ..fe_models.link_file import read_link
     from ..fe_models.remarks import remarks_on_link
     from ..present.console import Display
-    from ..run.inputs import files_of
 
-    protect(files_of(link_file))
+    protect_scene(link_file)
     with Display() as display:
         outcome = make_link(link_file, output, force=force, progress=display.stage)
     if not is_first():
@@ -70,7 +69,7 @@ def _inspect(file: Path, output: Path | None, unit: Unit | None, density: float 
     from ..present.console import summary_console
     from ..present.info import LISTED, print_inspection
 
-    protect([file])
+    protect(file)
     if output is not None:
         check_new_file(output, replace=force)
     part = inspect_part(file, unit)
@@ -83,7 +82,7 @@ def _inspect(file: Path, output: Path | None, unit: Unit | None, density: float 
 
     write_atomically(output, draft.encode(), "draft of a link file")
     for path in (output, *write_figure(draw_part(part, LISTED), output.parent, f"{output.stem}.faces", ("png",))):
-        console.print(f"written    {path}", soft_wrap=True)
+        console.out(f"written    {path}")
 
 
 @click.command()

@@ -91,7 +91,7 @@ def test_an_integrator_a_hundred_times_slower_is_asked_no_further():
     """At 1e-4 it is measured, as at that tolerance nothing was known of it; at 1e-5 not, whatever others take there."""
 
     def point(integrator, tolerance, seconds, status="completed"):
-        return Point(integrator, tolerance, TimedRun(integrator, status, seconds, 1, 0, 1), {}, [seconds])
+        return Point(integrator, tolerance, TimedRun(integrator, status, seconds), {}, [seconds])
 
     known = [point("dop853", 1e-3, 0.01), point("dop853", 1e-4, 0.02), point("dop853", 1e-5, 0.04)]
     slow = [point("generalized-alpha", 1e-3, 0.5), point("generalized-alpha", 1e-4, 2.1)]

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from ffrobot.bench import OF_A_SCENE
-from ffrobot.bench.precision import INTEGRATORS, TOLERANCES, Settings
+from ffrobot.bench.precision import Settings
 from ffrobot.present.console import Display, summary_console
 
 from .source_tree import PARTS, PEER, SourceTree
@@ -29,7 +29,7 @@ def main(output: Path, repeat: int, budget: float, parts: tuple[str, ...], peer:
     """Measure the two cases of the paper, growth with size, and ratios to hand-written code."""
     wanted = (*(parts or (*OF_A_SCENE, *PARTS)), *([PEER] if peer else []))
     with Display() as display:
-        campaign = SourceTree(output, Settings(INTEGRATORS, TOLERANCES, repeat, budget), display, summary_console())
+        campaign = SourceTree(output, Settings(repeat, budget), display, summary_console())
         campaign.everything(REPOSITORY, wanted, peer_python)
 
 

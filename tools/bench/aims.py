@@ -92,7 +92,7 @@ def _scene(scene: Scene, aim: Aim) -> Scene:
 def _rows(aim: Aim, scene: Scene, hand_written: HandWritten, repeat: int, budget: float, display: Watcher) -> list[Row]:
     """The run that a user gets who asks for 1e-4, and the fastest of all whose measured error is that small."""
     reference = find_reference(scene, NAME, REFERENCE_TOLERANCE, budget, display)
-    points = measure_points(scene, NAME, reference, Settings(INTEGRATORS, TOLERANCES, 2, budget), display)
+    points = measure_points(scene, NAME, reference, Settings(2, budget, INTEGRATORS, TOLERANCES), display)
     asked = next(point for point in points if (point.integrator, point.tolerance) == ("auto", ACCURACY))
     chosen = {"requested 1e-4": asked, "fastest within 1e-4": fastest(points, dict.fromkeys(aim.within, ACCURACY))}
     pairs: dict[str, list[tuple[float, float]]] = {label: [] for label in chosen}

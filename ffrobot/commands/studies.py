@@ -1,9 +1,9 @@
-"""The commands that study a robot: `bench`, `fit`, `map` and `smooth`."""
+"""The commands that study one robot: `bench`, `fit`, `map` and `smooth`."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -11,7 +11,7 @@ from ..bench import OF_A_SCENE
 from ..common.errors import InputError
 from ..common.files import write_atomically
 from ..present.logs import FILE, logging_options, python_option
-from .options import POSITIVE, batch_options, output_option, protect, scene_argument
+from .options import POSITIVE, batch_options, output_option, protect_scene, scene_argument
 
 if TYPE_CHECKING:
     from ..batch.batch import Batch
@@ -51,16 +51,7 @@ def _numbers(context: click.Context, parameter: click.Parameter, value: str | No
 @click.option("--part", "parts", multiple=True, type=click.Choice(OF_A_SCENE), help="Single part; repeatable [both].")
 @python_option
 @logging_options
-def bench(
-    scene_file: Path,
-    output: Path | None,
-    analysis: str | None,
-    integrators: list[str] | None,
-    tolerances: list[float] | None,
-    repeat: int,
-    budget: float,
-    parts: tuple[str, ...],
-) -> None:
+def bench(scene_file: Path, output: Path | None, analysis: str | None, parts: tuple[str, ...], **how: Any) -> None:
     """Measure run time against error, and where the error comes from.
 
     One of the scene's analyses with every integrator at every tolerance, against a reference that two integrators
@@ -68,12 +59,11 @@ def bench(
     figures as PNG and PDF.
     """
     from ..bench.campaign import Campaign
-    from ..bench.precision import INTEGRATORS, TOLERANCES, Settings
+    from ..bench.precision import Settings
     from ..present.console import Display, summary_console
-    from ..run.inputs import files_of
 
-    protect(files_of(scene_file))
-    settings = Settings(integrators or INTEGRATORS, tolerances or TOLERANCES, repeat, budget)
+    protect_scene(scene_file)
+    settings = Settings(**{key: value for key, value in how.items() if value is not None})
     folder = output or scene_file.with_suffix(".bench")
     with Display() as display:
         campaign = Campaign(folder, settings, display, summary_console())
@@ -94,15 +84,7 @@ def bench(
 @click.option("--force", is_flag=True, help="Replacement of files of an earlier fit.")
 @python_option
 @logging_options
-def fit(
-    file: Path,
-    measured: Path | None,
-    frf: Path | None,
-    vary: tuple[str, ...],
-    motors: Literal["free", "locked"] | None,
-    output: Path | None,
-    force: bool,
-) -> None:
+def fit(file: Path, measured: Path | None, frf: Path | None, vary: tuple[str, ...], **how: Any) -> None:
     """Fit keys of a link or a scene to measured natural frequencies or FRFs, and write new files.
 
     \b
@@ -115,24 +97,23 @@ def fit(
     compared in the poses of their tests; a picture shows measured and fitted curves.
     """  # noqa: D301 (click wants the backspace itself)
     from ..present.console import summary_console
-    from ..run.inputs import files_of
 
     table = measured or frf
     if table is None or (measured and frf):
         raise InputError("fit: expected one of --measured and --frf, found " + ("both" if table else "none"))
-    protect([*files_of(file), table])
+    protect_scene(file, table)
     keys, console = [key for text in vary for key in text.split(",")], summary_console()
     if measured:
         from ..fit.fitting import fit_measured, print_fit
 
-        print_fit(fit_measured(file, measured, keys, output, motors=motors, force=force), console)
+        print_fit(fit_measured(file, measured, keys, **how), console)
     else:
         from ..fit.frf import draw_responses, fit_responses, print_responses
 
-        fitted = fit_responses(file, table, keys, output, motors=motors or "locked", force=force)
+        fitted = fit_responses(file, table, keys, **how | {"motors": how["motors"] or "locked"})
         print_responses(fitted, console)
         picture = draw_responses(fitted, Path(fitted.files[-1]).with_suffix(".png"))
-        console.print(f"figure: {picture}", soft_wrap=True)
+        console.out(f"figure: {picture}")
 
 
 @click.command("map")
@@ -148,7 +129,9 @@ def fit(
     show_default="start, if the path of the scene has an orientation",
     help="Orientation of the tool over x, y, z.",
 )
-@click.option("--modes", type=click.IntRange(1, 50), default=3, show_default=True, help="Natural frequencies per pose.")
+@click.option(
+    "--modes", "count", type=click.IntRange(1, 50), default=3, show_default=True, help="Natural frequencies per pose."
+)
 @click.option(
     "--response", metavar="FIRST:LAST:COUNT", help="Frequency response of the point, with these frequencies (Hz)."
 )
@@ -162,18 +145,9 @@ def fit(
 @python_option
 @logging_options
 def map_(
-    scene_file: Path,
-    over: tuple[str, ...],
-    point: str | None,
-    orientation: str,
-    modes: int,
-    response: str | None,
-    milling: Path | None,
-    covariance: Path | None,
-    figures: bool,
-    batch: Batch,
-    output: Path | None,
-) -> None:
+    scene_file: Path, response: str | None, milling: Path | None, covariance: Path | None, figures: bool, batch: Batch,
+    output: Path | None, **which: Any,
+) -> None:  # fmt: skip
     """Map of the workspace: natural frequencies, stiffness, torque and deflection at rest, pose by pose.
 
     \b
@@ -188,7 +162,6 @@ def map_(
     from ..map.pose_map import make_map, plan_map
     from ..milling.process import read_milling
     from ..present.console import Display, summary_console
-    from ..run.inputs import files_of
 
     if covariance and not milling:
         raise InputError("--covariance: expected --milling, too", "none")
@@ -198,17 +171,9 @@ def map_(
 
         errors = read_covariance(covariance)
     folder = output or scene_file.with_suffix(".map")
-    protect([*files_of(scene_file), *(file for file in (milling, covariance) if file)])
-    plan = plan_map(
-        scene=scene_file,
-        over=over,
-        folder=folder,
-        point=point,
-        orientation=orientation,
-        count=modes,
-        frequencies=_frequencies(response),
-        milling=read_milling(milling) if milling else None,
-    )
+    protect_scene(scene_file, milling, covariance)
+    cutter = read_milling(milling) if milling else None
+    plan = plan_map(scene=scene_file, folder=folder, frequencies=_frequencies(response), milling=cutter, **which)
     with Display() as display:
         made = make_map(plan, batch, display)
         if errors:
@@ -220,9 +185,9 @@ def map_(
         from ..pictures.studies.pose_map import draw_map
 
         for picture in draw_map(made):
-            console.print(f"figure     {picture}", soft_wrap=True)
-    console.print(f"table      {folder / TABLE}", soft_wrap=True)
-    console.print(f"map        {path}", soft_wrap=True)
+            console.out(f"figure     {picture}")
+    console.out(f"table      {folder / TABLE}")
+    console.out(f"map        {path}")
 
 
 def _frequencies(text: str | None) -> Array:
@@ -286,7 +251,6 @@ def smooth(
     gears. Each is simulated; OUT is the one that settles first, or that of --write.
     """
     from ..present.console import Display, summary_console
-    from ..run.inputs import files_of
     from ..smooth.printed import picture, print_smooth, write_page
     from ..smooth.smoothing import check_target, smooth_motion
 
@@ -294,7 +258,7 @@ def smooth(
     controllers = {joint: value for joint, _, value in pairs}
     if len(controllers) < len(pairs) or ("" in controllers and len(controllers) > 1):
         raise InputError("--servo: expected one for all joints, or JOINT=… for each", ", ".join(servo))
-    protect([*files_of(scene_file), *([motion] if motion else []), *map(Path, controllers.values())])
+    protect_scene(scene_file, motion, *map(Path, controllers.values()))
     target = output or scene_file.with_suffix(".smooth.json")
     check_target(target, force=force)
     given = {key: value for key, value in how.items() if value is not None}
@@ -305,11 +269,11 @@ def smooth(
     print_smooth(found, console)
     if found.candidates:
         found.write(target, force=force)
-        console.print(f"written    {target}: {found.best.name}", soft_wrap=True, markup=False)
+        console.out(f"written    {target}: {found.best.name}")
     else:
-        console.print("written    no other motion", soft_wrap=True)
+        console.out("written    no other motion")
     figure, page = target.with_suffix(".png"), target.with_suffix(".report.html")
     write_atomically(figure, picture(found, "png"), "picture", ours=True)
-    console.print(f"figure     {figure}", soft_wrap=True)
+    console.out(f"figure     {figure}")
     write_page(found, motion, page)
-    console.print(f"report     {page}", soft_wrap=True)
+    console.out(f"report     {page}")
