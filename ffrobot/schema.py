@@ -94,9 +94,7 @@ class _Described(GenerateJsonSchema):
         return described
 
     def function_plain_schema(self, schema: core_schema.PlainValidatorFunctionSchema) -> JsonSchemaValue:
-        if record := schema.get("metadata", {}).get(RECORD):
-            return self.generate_inner(TypeAdapter(loaded(record)).core_schema)
-        return super().function_plain_schema(schema)
+        return self.generate_inner(TypeAdapter(loaded(schema["metadata"][RECORD])).core_schema)
 
 
 class _Spatial(_Described):

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..actuation.patches.records import by_body
 from ..actuation.points import PointSet, make_point_set
-from ..common.arrays import Array, Indices, as_floats
+from ..common.arrays import Array, Indices
 from ..common.errors import InputError
 from ..common.structs import struct
 from ..mbs._core import TimeFunction
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from ..actuation.patches.patches import Voltages
 
 Bodies = Mapping[str, LoadedBody]
-LEAST_PARTS, MOST_PARTS = 20_000, 2_560_000  # of time, in which voltages of loads are straight behind hysteresis
+PARTS = [20_000 << k for k in range(8)]  # of time, in which voltages of loads are straight behind hysteresis
 STRAIGHT = 2e-4  # of the largest voltage: what parts may miss
 JUMPS, BETWEEN = 100, 0.381966  # parts that may miss more; where in parts that is seen: at no simple fraction
 
@@ -103,26 +103,23 @@ def _straight(key: str, analyses: Sequence[Analysis], voltage: Sequence[TimeFunc
     Raises `InputError` for voltages that turn too often for their time.
     """
     first = min((float(analysis.times[0]) for analysis in analyses), default=0.0)
-    last, parts = max((analysis.last_time for analysis in analyses), default=0.0), LEAST_PARTS
+    last = max((analysis.last_time for analysis in analyses), default=0.0)
     last = last if last > first else first + 1.0
 
     def sampled(times: Array) -> Array:
-        return as_floats(np.stack([function.sample(times)[0] for function in voltage], axis=1))
+        return np.stack([function.sample(times)[0] for function in voltage], axis=1)
 
-    while True:
-        times = as_floats(np.linspace(first, last, parts + 1))
+    for parts in PARTS:
+        times = np.linspace(first, last, parts + 1)
         values = sampled(times)
         between = sampled(times[:-1] + BETWEEN * np.diff(times))
         missed = np.abs(between - values[:-1] - BETWEEN * np.diff(values, axis=0))
         bent = int(np.count_nonzero((missed > STRAIGHT * np.abs(values).max()).any(axis=1)))
         if bent <= JUMPS:
             return times, values
-        if 2 * parts > MOST_PARTS:
-            break
-        parts *= 2
     if bent > BETWEEN * parts:
         raise InputError(
-            f"{key}: expected no more than about {MOST_PARTS // 80} reversals of voltages on patches with hysteresis",
+            f"{key}: expected no more than about {PARTS[-1] // 80} reversals of voltages on patches with hysteresis",
             f"more from {first:g} to {last:g} s: shorten the analyses",
         )
     return times, values

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..common.arrays import Array, as_floats
+from ..common.arrays import Array
 from ..mbs.model.body import Body
 from ..mbs.model.truncation import loaded_points, with_fewer_modes
 from ..mbs.quantities.motion import deflection
@@ -40,9 +40,9 @@ def reported_modes(result: AnalysisResult) -> Reported:
     for trajectory in followed_trajectories(run):
         force, places = path_force(run, trajectory.name), len(trajectory.components)
         forces[f"trajectory {trajectory.name}"] = force[:, :places]
-        forces[f"trajectory {trajectory.name}, moment"] = as_floats(force[:, places:] / size)
+        forces[f"trajectory {trajectory.name}, moment"] = force[:, places:] / size
     for joint, acting in result.reactions.items():
-        forces[f"joint {joint}"], forces[f"joint {joint}, moment"] = acting.force, as_floats(acting.moment / size)
+        forces[f"joint {joint}"], forces[f"joint {joint}, moment"] = acting.force, acting.moment / size
     points = [f"{node.body.name}.{label}" for node in nodes for label in node.body.points]
     voltages = {} if result.actuation is None else result.actuation.voltages
     found_by_kind = {

@@ -6,7 +6,6 @@ from functools import partial
 
 import numpy as np
 
-from ..common.arrays import as_floats
 from ..common.errors import InputError
 from ..mbs.model.divided_link import DividedLink, LinkInPieces, PieceOfLink, divided_link_of
 from ..mbs.model.model import Model
@@ -37,7 +36,7 @@ def links_in_pieces(prepared: Prepared) -> dict[str, LinkInPieces]:
             pieces=tuple(piece for piece in pieces if piece is not None),
             places={label: body.point(label) for label in body.cut.places},
             points=whole.points,
-            to_own=as_floats(np.linalg.pinv(whole.modal_transform).T),
+            to_own=np.linalg.pinv(whole.modal_transform).T,
         )
     return links
 
