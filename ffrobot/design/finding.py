@@ -83,10 +83,10 @@ class Finding(ABC):
         """Print the tables as text, then the notes."""
         for section in self.sections():
             if section.line:
-                console.print(section.line, soft_wrap=True)
+                console.out(section.line)
             print_table(console, section.heading, section.rows)
         for line in self.remarks():
-            console.print(line, soft_wrap=True)
+            console.out(line)
 
     def __str__(self) -> str:
         console = plain_console(out := StringIO(), 120)

@@ -301,7 +301,7 @@ def print_fit(fit: Fit, console: Console) -> None:
     )
     print_table(console, ("mode", "measured (Hz)", "start (Hz)", "fitted (Hz)", "error"), modes)
     for line in (*remarks(fit), *(f"written: {path}" for path in fit.files)):
-        console.print(line, soft_wrap=True)
+        console.out(line)
 
 
 def print_parameters(fit: Parameters, console: Console) -> None:

@@ -120,7 +120,7 @@ def print_responses(fit: ResponseFit, console: Console) -> None:
     heading = ("test", "used for", "FRFs", "least FRAC", "mean FRAC", "peaks: largest error", "misfit")
     print_table(console, heading, rows)
     for line in (*remarks(fit), *(f"written: {path}" for path in fit.files)):
-        console.print(line, soft_wrap=True)
+        console.out(line)
 
 
 def remarks(fit: ResponseFit) -> Iterator[str]:

@@ -183,12 +183,12 @@ def _beyond(round_off: float, values: Array) -> Array:
 
 def print_map(poses: PoseMap, console: Console) -> None:
     """A table of quantities: the worst and the best value with the poses; then how many poses there are."""
-    console.print(f"{poses.plan.point} over {' and '.join(axis.name for axis in poses.plan.axes)}", soft_wrap=True)
+    console.out(f"{poses.plan.point} over {' and '.join(axis.name for axis in poses.plan.axes)}")
     print_table(console, ("quantity", "worst", "at", "best", "at"), _ranges(poses))
     for line in _milling(poses):
-        console.print(f"milling    {line}", soft_wrap=True)
+        console.out(f"milling    {line}")
     counts = ", ".join(f"{int((poses.status == k).sum())} {name}" for k, name in enumerate(STATUS))
-    console.print(f"poses      {counts}", soft_wrap=True)
+    console.out(f"poses      {counts}")
 
 
 def _ranges(poses: PoseMap) -> Iterator[tuple[str, ...]]:

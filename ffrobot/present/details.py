@@ -51,7 +51,7 @@ def print_details(solution: Solution, results: Results, console: Console) -> Non
         notes.add_row(title, text)
     console.print()
     console.print(notes)
-    console.print(f"results    {results.path}", soft_wrap=True)
+    console.out(f"results    {results.path}")
 
 
 def _warnings(analyses: Mapping[str, AnalysisResult]) -> Iterator[str]:

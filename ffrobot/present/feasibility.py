@@ -179,7 +179,7 @@ def print_motor_choice(path: Path, catalog: Path, analysis: str | None, console:
             analysis or "none", judged, f"{path}: --analysis: expected an analysis with motors, {quoted(judged)}"
         )
     for name in judged if analysis is None else [analysis]:
-        console.print(f'analysis "{name}", motors of {catalog}', soft_wrap=True)
+        console.out(f'analysis "{name}", motors of {catalog}')
         rows = (row for joint, task in tasks[name].items() for row in _rows(joint, choices(task, motors)))
         print_table(console, COLUMNS, rows)
     console.print("at the motor, with its own rotor; solve again with its gear_ratio and rotor_inertia to confirm")

@@ -154,7 +154,7 @@ def print_inspection(file: Path, part: Inspection, density: float | None, consol
     if part.groups:
         lines.append(f"groups {', '.join(part.groups)}")
     for line in (*lines, *(f"remark     {remark}" for remark in part.remarks)):
-        console.print(line, soft_wrap=True)
+        console.out(line)
     rows = []
     for k, face in enumerate(part.faces[:LISTED], start=1):
         radius = "–" if face.radius is None else f"{1000 * face.radius:.5g}"

@@ -33,7 +33,7 @@ def print_start(path: Path, watcher: Watcher, console: Console) -> None:
     if points := [row[: len(columns)] for row in _points(model, first.q)]:
         print_table(console, columns, points)
     if first.branch:
-        console.print(in_words(first.branch), soft_wrap=True)
+        console.out(in_words(first.branch))
     if others:
         from ..mbs.posture.workspace import within_limits
 
@@ -41,7 +41,7 @@ def print_start(path: Path, watcher: Watcher, console: Console) -> None:
     for other in others:
         beyond = "" if within_limits(model, other.q[None])[0] else " (beyond joint limits)"
         named = f", {in_words(other.branch)}" if other.branch else ""
-        console.print(f"  {np.degrees(other.away):.0f}° away{beyond}{named}: {other.guess}", soft_wrap=True)
+        console.out(f"  {np.degrees(other.away):.0f}° away{beyond}{named}: {other.guess}")
 
 
 def _joints(model: Model, q: Array) -> Iterator[tuple[str, ...]]:

@@ -28,10 +28,10 @@ COLUMNS = ("joint", "from", "to", "speed", "acceleration", "jerk", "at most, by 
 def print_smooth(smoothed: Smoothed, console: Console) -> None:
     """Lines on the motion as it is, faults, a table of joints, the verdict."""
     for name, text in _lines(smoothed):
-        console.print(f"{name:<10} {text}", soft_wrap=True, markup=False)
+        console.out(f"{name:<10} {text}")
     joints, *motions = _tables(smoothed)
     print_table(console, *joints)
-    console.print(f"verdict    {smoothed.verdict}", soft_wrap=True, markup=False)
+    console.out(f"verdict    {smoothed.verdict}")
     for table in motions:
         console.print()
         print_table(console, *table)

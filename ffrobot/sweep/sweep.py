@@ -271,9 +271,9 @@ def print_table(sweep: Sweep, rows: Sequence[Row], console: Console) -> None:
     console.print(table)
     for row in rows:
         if row.status != "completed":
-            console.print(f"run {row.number}: {row.status}: {row.message}", soft_wrap=True)
+            console.out(f"run {row.number}: {row.status}: {row.message}")
     more = f", with {len(quantities) - len(shown)} more quantities" if len(quantities) > len(shown) else ""
-    console.print(f"table      {sweep.table}{more}", soft_wrap=True)
+    console.out(f"table      {sweep.table}{more}")
 
 
 def _broken(header: str) -> str:
