@@ -3,6 +3,7 @@
 import numpy as np
 import tomli_w
 import tree_oracle
+from beam_links import link_keys
 from scipy.spatial.transform import Rotation
 
 from ffrobot.run.solve import prepare_scene
@@ -37,15 +38,12 @@ def _link(rng, name, kind, families, damping, stout):
         return round(float(rng.uniform(low, high)), 4)
 
     length = round(float(rng.uniform(0.25 if stout else 0.3, 0.6)), 3)
-    section = _section(rng, kind, number, stout)
-    return {
-        "name": name,
-        "material": {"youngs_modulus": 70e9, "density": 2700.0, "poissons_ratio": 0.33},
-        "geometry": {"kind": kind, "length": length, "section": section},
-        "reference": {"condition": str(rng.choice(["cantilever", "simply-supported"]))},
-        "modes": {"count": int(rng.integers(1, 4)), "family": families},
-        "damping": {"ratio": damping},
-    } | ({"mesh": {"elements": 8}} if kind == "beam" else {})
+    section, mesh = _section(rng, kind, number, stout), {"elements": 8} if kind == "beam" else {}
+    condition = str(rng.choice(["cantilever", "simply-supported"]))
+    modes = {"count": int(rng.integers(1, 4)), "family": families}
+    return link_keys(
+        kind, length, section, mesh, condition=condition, name=name, modes=modes, damping={"ratio": damping}
+    )
 
 
 def _rigid(rng, name, offset, stout):

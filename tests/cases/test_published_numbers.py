@@ -8,7 +8,7 @@ from beam_links import beam_link, circle, modal_body, rectangle
 from patches_on_links import bent, on_link, planar_body
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
-from tables_3d import joint, rigid, scene
+from tables_3d import joint, pin, planar, rigid, scene
 
 import ffrobot
 from ffrobot.actuation.patches.composite import PlacedLayout, patched_body
@@ -87,16 +87,9 @@ def test_extension_of_a_spinning_beam():
     section = rectangle(float(height), width)
     link = beam_link(10.0, section, 20, E=EA / area, nu=0.3, rho=line_mass / area, modes=modes, damping={"ratio": 0.02})
     spin = "where(t < 15, 6/15*(t**2/2 + (15/(2*pi))**2*(cos(2*pi*t/15) - 1)), 6*(t - 7.5))"
-    tables = {
-        "name": "spin_up",
-        "space": "planar",
-        "gravity": [0.0, 0.0],
-        "geometric_stiffening": "auto",
-        "body": [{"name": "beam", "link": link}],
-        "joint": [joint("hub", "revolute", "ground", "beam.root")],
-        "trajectory": [{"name": "spin", "joint": "hub", "value": spin}],
-        "analysis": [{"name": "turn", "kind": "pcid", "end": 30.0, "output_step": 0.01}],
-    }
+    turn = {"name": "turn", "kind": "pcid", "end": 30.0, "output_step": 0.01}
+    keys = {"geometric_stiffening": "auto", "trajectory": [{"name": "spin", "joint": "hub", "value": spin}]}
+    tables = planar([{"name": "beam", "link": link}], [pin("hub", "ground", "beam.root")], turn, gravity=[0, 0], **keys)
     with ffrobot.solve(ffrobot.make_scene(**tables)) as results:
         extension = results["turn/points/beam.tip/deflection"][results["turn/time"] > 25.0, 0].mean()
     assert extension == pytest.approx(line_mass * 6.0**2 * 10.0**3 / (3 * EA), rel=1e-3)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tables_3d import rigid
+from tables_3d import rigid, scene
 
 import ffrobot
 
@@ -46,10 +46,17 @@ def chain(types, turned):
         inwards = turned and k % 2
         joints.append({"name": f"j{k}", "type": kind, "between": sides[:: -1 if inwards else 1]} | keys)
         guess[f"j{k}"] = POSE[kind]
-    return {
-        "name": "chain", "space": "spatial", "gravity": [1.0, 2.0, -9.0], "body": bodies, "joint": joints,
-        "initial": {"joints": guess},
-    }  # fmt: skip
+    return scene(bodies, joints, gravity=[1.0, 2.0, -9.0], initial={"joints": guess})
+
+
+def solved(tables, analyses):
+    return ffrobot.solve(ffrobot.make_scene(**tables | {"analysis": analyses}))
+
+
+def no_work(results, names, joints):
+    for name in names:
+        for joint in joints:
+            assert np.abs(along_joint(results, name, joint)).max() < 1e-7, (name, joint["name"])
 
 
 def along_joint(results, analysis, joint):
@@ -80,12 +87,11 @@ def test_reactions_do_no_work_along_joints_that_follow_paths(turned):
         {"name": f"t{k}", "joint": joint["name"], "value": f"{POSE[joint['type']]}+0.3*t**2*sin({k + 4}*t)"}
         for k, joint in enumerate(tables["joint"])
     ]
-    stiff = {joint["name"]: 5.0 for joint in tables["joint"]}
-    results = ffrobot.solve(ffrobot.make_scene(**tables, analysis=analyses(stiff)))
+    results = solved(tables, analyses({joint["name"]: 5.0 for joint in tables["joint"]}))
+    no_work(results, KINDS, tables["joint"])
     for name in KINDS:
         for joint in tables["joint"]:
             assert np.abs(results[f"{name}/joints/{joint['name']}/moment"]).max() > 1e-3
-            assert np.abs(along_joint(results, name, joint)).max() < 1e-7, (name, joint["name"])
 
 
 @pytest.mark.parametrize("turned", [False, True], ids=["outwards", "inwards"])
@@ -93,19 +99,13 @@ def test_reactions_do_no_work_along_joints_with_several_coordinates(turned):
     """A tool in six coordinates that follows a pose, or motors that do."""
     tables = chain(["cylindrical", "universal", "revolute", "prismatic"], turned)
     joints, tip = tables["joint"], f"b{len(tables['joint']) - 1}.tip"
-    start = ffrobot.solve(
-        ffrobot.make_scene(**tables, analysis=[{"name": "a", "kind": "forward", "end": 1e-3, "output_step": 1e-3}])
-    )
+    start = solved(tables, [{"name": "a", "kind": "forward", "end": 1e-3, "output_step": 1e-3}])
     x = start[f"a/points/{tip}/position"][0]
     turn = Rotation.from_quat(np.roll(start[f"a/points/{tip}/quaternion"][0], -1)).as_rotvec()
     path = {key: f"{value}+0.4*t**2" for key, value in zip("xyz", x, strict=True)}
     path |= {"rotation_vector": ["t**2", "0", "-t**2"], "reference_rotation_vector": turn.tolist()}
     tables["trajectory"] = [{"name": "t", "point": tip, **path}]
-    stiff = {f"{joint['name']}": 5.0 for joint in joints}
-    results = ffrobot.solve(ffrobot.make_scene(**tables, analysis=analyses(stiff)))
-    for name in KINDS:
-        for joint in joints:
-            assert np.abs(along_joint(results, name, joint)).max() < 1e-7, (name, joint["name"])
+    no_work(solved(tables, analyses({joint["name"]: 5.0 for joint in joints})), KINDS, joints)
 
 
 @pytest.mark.parametrize("unit", [1.0, 1e3])
@@ -115,12 +115,9 @@ def test_a_screw_jack_in_closed_form(unit):
     nut = body("nut", [0.0, 0.0, unit])
     nut["rigid"] |= {"mass": m, "center": [0.0, 0.0, 0.0], "inertia": [J, J, J]}
     joint = {"name": "jack", "type": "screw", "between": ["ground", "nut.root"], "axis": [0, 0, 1], "lead": lead}
-    results = ffrobot.solve(
-        ffrobot.make_scene(
-            name="jack", space="spatial", gravity=[0.0, 0.0, -9.81 * unit], body=[nut], joint=[joint],
-            trajectory=[{"name": "t", "joint": "jack", "value": "20*t**3"}], analysis=analyses({"jack": 5.0 * unit**2}),
-        )
-    )  # fmt: skip
+    path = {"name": "t", "joint": "jack", "value": "20*t**3"}
+    tables = scene([nut], [joint], gravity=[0.0, 0.0, -9.81 * unit], trajectory=[path])
+    results = solved(tables, analyses({"jack": 5.0 * unit**2}))
     h = lead / (2 * np.pi)
     for name in ("straight", "inverse", "again", "along"):
         alpha = 120.0 * results[f"{name}/time"]
@@ -144,10 +141,10 @@ def test_friction_loads_and_rotors_along_joints_are_no_reactions(turned):
         joint |= ROUGH | ({"rotor_inertia": 0.02} if joint["type"] in ("revolute", "prismatic") else {})
     tables["load"] = [{"joint": "j0", "moment": "7*cos(9*t)"}, {"joint": "j2", "moment": "3*cos(9*t)"}]
     fall = {"name": "fall", "kind": "forward", "end": END, "output_step": STEP, "tolerance": 1e-9}
-    results = ffrobot.solve(ffrobot.make_scene(**tables, analysis=[fall]))
+    results = solved(tables, [fall])
+    no_work(results, ["fall"], tables["joint"])
     for joint in tables["joint"]:
         assert np.abs(results[f"fall/joints/{joint['name']}/rate"]).max() > 1e-2
-        assert np.abs(along_joint(results, "fall", joint)).max() < 1e-7, joint["name"]
 
 
 @pytest.mark.parametrize("closes", [False, True], ids=["in the tree", "closes a loop"])
@@ -163,11 +160,8 @@ def test_a_block_that_slides_with_friction_in_closed_form(closes):
     rough = rail | {"name": "rough", "viscous_friction": d}
     joints = [rail | {"name": "smooth"}, rough] if closes else [rough]
     fall = {"name": "fall", "kind": "forward", "end": 0.5, "output_step": 0.05, "tolerance": 1e-9}
-    scene = ffrobot.make_scene(
-        name="block", space="spatial", gravity=[0.0, 0.0, -10.0], body=[block], joint=joints, analysis=[fall],
-        initial={"joint_rates": {joint["name"]: v0 for joint in joints}},
-    )  # fmt: skip
-    results = ffrobot.solve(scene)
+    start = {"joint_rates": {joint["name"]: v0 for joint in joints}}
+    results = solved(scene([block], joints, gravity=[0.0, 0.0, -10.0], initial=start), [fall])
     time, shares = results.time("fall"), 2 if closes else 1
     np.testing.assert_allclose(
         results["fall/bodies/block/position"][:, 0], v0 * m / d * (1 - np.exp(-d * time / m)), atol=1e-7
@@ -182,8 +176,7 @@ def test_a_weld_carries_a_robot_that_cannot_move():
     kinds = [{"name": "rest", "kind": "static"}, {"name": "about", "kind": "linear"}]
     kinds += [{"name": "on", "kind": "forward", "end": END, "output_step": STEP}]
     weld = {"name": "W", "type": "weld", "between": ["ground", "b.root"]}
-    tables = {"name": "still", "space": "spatial", "gravity": [0.0, 0.0, -9.81], "joint": [weld], "analysis": kinds}
-    with ffrobot.solve(ffrobot.make_scene(**tables, body=[body("b", [0.3, 0.0, 0.0])])) as results:
+    with solved(scene([body("b", [0.3, 0.0, 0.0])], [weld]), kinds) as results:
         for kind in ("rest", "on"):
             force, moment = (results[f"{kind}/joints/W/{key}"] for key in ("reaction", "reaction_moment"))
             np.testing.assert_allclose(force, np.tile([0.0, 0.0, 0.7 * 9.81], (len(force), 1)), atol=1e-12)

@@ -7,7 +7,8 @@ import pytest
 import scenes_in_3d
 from checkpoint_scene_files import write_scene
 from scipy.integrate import simpson
-from tables_3d import revolute, rigid
+from scipy.spatial.transform import Rotation
+from tables_3d import ORIGIN, pin, planar, revolute, rigid, scene
 
 import ffrobot
 from ffrobot.common.errors import InputError
@@ -51,20 +52,14 @@ def arm(*analyses, **keys):
         joints.append(revolute(JOINTS[k], inner, f"l{k}.root", axis.tolist()))
     joints[0]["at"] = [0.0, 0.0, 0.4]
     _, _, A, tip = places(GUESS)
-    turn = [float(x) for x in np.array([A[2, 1] - A[1, 2], A[0, 2] - A[2, 0], A[1, 0] - A[0, 1]])]
-    angle = np.arccos((np.trace(A) - 1) / 2)
-    turn = (np.array(turn) / (2 * np.sin(angle)) * angle).tolist()
-    way = "(1-cos(2*pi*t))"
-    tip = tip.tolist()
+    turn, tip, way = Rotation.from_matrix(A).as_rotvec().tolist(), tip.tolist(), "(1-cos(2*pi*t))"
     path = {
         "name": "tool", "point": "l6.tip", "reference_rotation_vector": turn,
         "x": f"{tip[0]!r} - 0.03*{way}", "y": f"{tip[1]!r} + 0.06*{way}", "z": f"{tip[2]!r} + 0.04*{way}",
         "rotation_vector": [f"0.05*{way}", "0", f"-0.08*{way}"],
     }  # fmt: skip
-    return {
-        "name": "arm7", "space": "spatial", "gravity": [0.0, 0.0, -9.81], "body": bodies, "joint": joints,
-        "trajectory": [path], "initial": {"joints": dict(zip(JOINTS, GUESS, strict=True))}, "analysis": list(analyses),
-    } | keys  # fmt: skip
+    start = {"joints": dict(zip(JOINTS, GUESS, strict=True))}
+    return scene(bodies, joints, *analyses, trajectory=[path], initial=start, **keys)
 
 
 def solve(tables):
@@ -121,15 +116,12 @@ def stretching(reach, redundancy, T=0.6, L=0.35):
     tip = L * np.exp(1j * np.cumsum(list(start.values()))).sum()
     s = f"(10*(t/{T})**3 - 15*(t/{T})**4 + 6*(t/{T})**5)"
     r, phi = f"({abs(tip)} + {3 * L * reach - abs(tip)}*{s})", f"({np.angle(tip)} + 0.3*{s})"
-    return ffrobot.make_scene(
-        name="arm", gravity=[0.0, -9.81], redundancy=redundancy, initial={"joints": start},
-        body=[{"name": name, "rigid": bar} for name in "abc"],
-        joint=[
-            {"name": name, "type": "revolute", "between": between}
-            for name, *between in (("A", "ground", "a.root"), ("B", "a.tip", "b.root"), ("C", "b.tip", "c.root"))
-        ],
+    return planar(
+        [{"name": name, "rigid": bar} for name in "abc"],
+        [pin("A", "ground", "a.root"), pin("B", "a.tip", "b.root"), pin("C", "b.tip", "c.root")],
+        {"name": "inverse", "kind": "pcid", "end": T, "output_step": T / 100},
         trajectory=[{"name": "tip", "point": "c.tip", "x": f"{r}*cos({phi})", "y": f"{r}*sin({phi})"}],
-        analysis=[{"name": "inverse", "kind": "pcid", "end": T, "output_step": T / 100}],
+        redundancy=redundancy, initial={"joints": start},
     )  # fmt: skip
 
 
@@ -141,7 +133,7 @@ def test_least_torque_near_the_edge_of_reach(reach, least):
     """
     sums = []
     for criterion in ("least-torque", "least-motion"):
-        with ffrobot.solve(stretching(reach, criterion)) as found:
+        with solve(stretching(reach, criterion)) as found:
             moments = np.stack([found[f"inverse/joints/{joint}/moment"] for joint in "ABC"])
             sums.append(simpson(np.sum(moments**2, axis=0), x=found["inverse/time"]))
     assert sums[0] == pytest.approx(least, rel=0.01)
@@ -194,14 +186,13 @@ def test_a_path_out_of_reach_ends_where_the_arm_is_straight(criterion):
     bars = [rigid(name, 1.0, [1e-3, 0.02, 0.02], [0.2, 0.0, 0.0], tip=[0.4, 0.0, 0.0]) for name in names[1:]]
     ends = ["ground", "a.tip", "b.tip"]
     joints = [revolute(f"j{k}", ends[k], f"{names[k + 1]}.root", [0.0, 0.0, 1.0]) for k in range(3)]
-    scene = ffrobot.make_scene(
-        name="edge", space="spatial", gravity=[0.0, 0.0, 0.0], body=bars, joint=joints, redundancy=criterion,
-        initial={"joints": {"j0": 0.8, "j1": -1.0, "j2": -0.6}},
+    tables = scene(
+        bars, joints, {"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 0.1}, gravity=ORIGIN,
+        initial={"joints": {"j0": 0.8, "j1": -1.0, "j2": -0.6}}, redundancy=criterion,
         trajectory=[{"name": "line", "point": "c.tip", "x": "0.7 + 0.6*t", "y": "0.1"}],
-        analysis=[{"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 0.1}],
     )  # fmt: skip
     with pytest.raises(ffrobot.SolveError, match="the joints cannot follow the path there") as error:
-        ffrobot.solve(scene)
+        solve(tables)
     reached = (np.sqrt(1.2**2 - 0.1**2) - 0.7) / 0.6
     assert float(re.search(r"at t = ([\d.]+) s", str(error.value))[1]) == pytest.approx(reached, abs=1e-6)
 

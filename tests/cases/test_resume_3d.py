@@ -1,7 +1,9 @@
 """Runs in 3D that were stopped go on from their results file as if they had never been."""
 
 import pytest
+import tables_3d
 from stopped_runs import SAME, Stops, differences, go_on
+from tables_3d import joint, rigid
 
 import ffrobot
 
@@ -28,17 +30,14 @@ tolerance = 1e-6
 
 def test_a_body_that_tumbles_goes_on(tmp_path):
     """Where q has a quaternion, which is brought to length one once more: the same to rounding."""
-    scene = ffrobot.make_scene(
-        folder=tmp_path,
-        name="top",
-        space="spatial",
-        body=[{"name": "top", "rigid": {"mass": 2.0, "center": [0.0, 0.0, 0.3], "inertia": [0.03, 0.05, 0.02],
-                                        "points": {"foot": [0.0, 0.0, 0.0]}}}],
-        joint=[{"name": "pivot", "type": "spherical", "between": ["ground", "top.foot"]}],
-        gravity=[0.0, 1.0, -9.81],
-        initial={"joint_rates": {"pivot": [3.0, 1.0, 40.0]}},
-        analysis=[{"name": "spin", "kind": "forward", "end": 20.0, "output_step": 0.05, "tolerance": 1e-9}],
-    )  # fmt: skip
+    top, pivot = (
+        rigid("top", 2.0, [0.03, 0.05, 0.02], [0.0, 0.0, 0.3]),
+        joint("pivot", "spherical", "ground", "top.root"),
+    )
+    spin = {"name": "spin", "kind": "forward", "end": 20.0, "output_step": 0.05, "tolerance": 1e-9}
+    start = {"joint_rates": {"pivot": [3.0, 1.0, 40.0]}}
+    tables = tables_3d.scene([top], [pivot], spin, gravity=[0.0, 1.0, -9.81], initial=start)
+    scene = ffrobot.make_scene(folder=tmp_path, **tables)
     expected, path = ffrobot.solve(scene), tmp_path / "top.h5"
     with pytest.raises(ffrobot.SolveError, match=r"resume=True\) resumes from t = "):
         ffrobot.solve(scene, path, Stops("spin", 4.0))

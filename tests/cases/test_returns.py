@@ -4,9 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tables_3d
 import tree_oracle
 from patch_sets import amplifiers
 from scipy.optimize import lsq_linear
+from tables_3d import Y, Z, joint, revolute
 from test_replays_3d import beam
 
 import ffrobot
@@ -45,23 +47,21 @@ def solution():
     return prepare_scene(scene(), Watcher())
 
 
-def scene(load=(), limits=({}, {}), **more):
+def scene(load=(), limits=({}, {})):
     """Two beams on a universal joint and a revolute one, all with motors; the tip follows a line."""
     s = f"(10*(t/{END})**3-15*(t/{END})**4+6*(t/{END})**5)"
     tip = LENGTH * np.array([1 + np.cos(BENT), 0.0, -np.sin(BENT)])
     path = {axis: f"{x:.17g}+({size})*{s}" for axis, x, size in zip("xyz", tip, SIZES, strict=True)}
     joints = [
-        {"name": "shoulder", "type": "universal", "between": ["ground", "b0.root"], "axis": [0.0, 0.0, 1.0],
-         "second_axis": [0.0, 1.0, 0.0], "motor": True} | limits[0],
-        {"name": "elbow", "type": "revolute", "between": ["b0.tip", "b1.root"], "axis": [0.0, 1.0, 0.0],
-         "motor": True} | limits[1],
-    ]  # fmt: skip
-    return ffrobot.make_scene(
-        name="arm", space="spatial", gravity=[0.0, 0.0, -9.81], body=[beam("b0"), beam("b1")], joint=joints,
+        joint("shoulder", "universal", "ground", "b0.root", axis=Z, second_axis=Y, motor=True, **limits[0]),
+        revolute("elbow", "b0.tip", "b1.root", Y, motor=True, **limits[1]),
+    ]
+    tables = tables_3d.scene(
+        [beam("b0"), beam("b1")], joints, {"name": "inverse", "kind": "pcid", "end": END, "output_step": END / 50},
         initial={"state": "static", "joints": {"shoulder": [0.0, 0.0], "elbow": BENT}}, load=list(load),
         trajectory=[{"name": "path", "point": "b1.tip", **path}],
-        analysis=[{"name": "inverse", "kind": "pcid", "end": END, "output_step": END / 50}], **more,
     )  # fmt: skip
+    return ffrobot.make_scene(**tables)
 
 
 def full(model):

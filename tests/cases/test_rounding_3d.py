@@ -5,10 +5,12 @@ import re
 import numpy as np
 import pytest
 from beam_links import beam_link, rectangle, tube
+from tables_3d import joint, planar, scene
 
 import ffrobot
 
 TIGHT = 1e-9
+INVERSE = {"name": "inv", "kind": "pcid", "max_steps": 20000}
 
 
 def beam(name, length, height, width, condition, ratio):
@@ -16,53 +18,47 @@ def beam(name, length, height, width, condition, ratio):
     return {"name": name, "link": beam_link(length, rectangle(height, width), 8, condition=condition, **keys)}
 
 
-def joint(name, type_, between, rpy, **keys):
-    motor = {} if type_ == "spherical" else {"motor": name == "O"}
-    turned = {} if rpy is None else {"rpy": rpy}
-    return {"name": name, "type": type_, "between": between, **turned, **motor, **keys}
-
-
 @pytest.fixture(scope="module")
 def four_bar():
     """A crank of 0.4 g, whose tip turns the rod by a universal joint, in static equilibrium: runs by their keys."""
 
     def solved(**keys):
-        scene = ffrobot.make_scene(
-            name="four_bar",
-            space="spatial",
-            gravity=[0.6571, -8.558, 4.7503],
-            body=[
-                beam("crank", 0.06577, 0.0013, 0.00183, "simply-supported", 0.01),
-                beam("rod", 0.39146, 0.00705, 0.01092, "cantilever", 0.0),
-                beam("rock", 0.3461, 0.00721, 0.01041, "simply-supported", 0.01),
-            ],
-            joint=[
-                joint("O", "revolute", ["ground", "crank.root"], DRIVE, axis=[0.46033, 0.8619, -0.21267]),
-                joint("U", "universal", ["crank.tip", "rod.root"], UNIVERSAL, axis=FIRST, second_axis=SECOND),
-                joint("S", "spherical", ["rod.tip", "rock.tip"], None),
-                joint("Q", "revolute", ["ground", "rock.root"], ROCKER, axis=[0.8398, -0.49703, 0.21842], at=PIVOT),
-            ],
+        bodies = [
+            beam("crank", 0.06577, 0.0013, 0.00183, "simply-supported", 0.01),
+            beam("rod", 0.39146, 0.00705, 0.01092, "cantilever", 0.0),
+            beam("rock", 0.3461, 0.00721, 0.01041, "simply-supported", 0.01),
+        ]
+        joints = [
+            joint("O", "revolute", "ground", "crank.root", motor=True, **DRIVE),
+            joint("U", "universal", "crank.tip", "rod.root", motor=False, **UNIVERSAL),
+            joint("S", "spherical", "rod.tip", "rock.tip"),
+            joint("Q", "revolute", "ground", "rock.root", motor=False, **ROCKER),
+        ]
+        tables = scene(
+            bodies, joints, INVERSE | {"end": 0.3, "output_step": 0.01} | keys, gravity=[0.6571, -8.558, 4.7503],
             initial={"state": "static", "joints": {"O": -0.49315}},
             trajectory=[{"name": "d", "joint": "O", "value": MOTION}],
-            analysis=[{"name": "inv", "kind": "pcid", "end": 0.3, "output_step": 0.01, "max_steps": 20000, **keys}],
         )  # fmt: skip
-        return ffrobot.solve(scene)
+        return ffrobot.solve(ffrobot.make_scene(**tables))
 
     return solved
 
 
 MOTION = "-0.49315 + 0.00597*(10*(t/0.3)**3 - 15*(t/0.3)**4 + 6*(t/0.3)**5)"
-DRIVE, ROCKER = [-2.28683, 0.66224, -2.624], [-0.82132, 0.58578, -2.81788]
-PIVOT = [0.10956, -0.1357, -0.18527]
-FIRST = [-0.3624011439914209, 0.8698454308570439, 0.3347153077629302]
-SECOND = [-0.7642044079087118, 0.5449168110059214, -0.3450467968494014]
-UNIVERSAL = [-0.9549194277130745, 0.04012673226025898, 0.1575400414727917]
+DRIVE = {"axis": [0.46033, 0.8619, -0.21267], "rpy": [-2.28683, 0.66224, -2.624]}
+ROCKER = {
+    "axis": [0.8398, -0.49703, 0.21842], "rpy": [-0.82132, 0.58578, -2.81788], "at": [0.10956, -0.1357, -0.18527],
+}  # fmt: skip
+UNIVERSAL = {
+    "axis": [-0.3624011439914209, 0.8698454308570439, 0.3347153077629302],
+    "second_axis": [-0.7642044079087118, 0.5449168110059214, -0.3450467968494014],
+    "rpy": [-0.9549194277130745, 0.04012673226025898, 0.1575400414727917],
+}
 
 
 def rates(results):
     """Of the joints that are angles: (T, 4) rad/s."""
-    found = [results[f"inv/joints/{name}/rate"] for name in "OUQ"]
-    return np.column_stack(found)
+    return np.column_stack([results[f"inv/joints/{name}/rate"] for name in "OUQ"])
 
 
 def relative(found, expected):
@@ -88,24 +84,21 @@ def test_a_tolerance_below_rounding_is_named(four_bar):
     assert relative(rates(tight), rates(other)) < would_do
 
 
-def chain(count, link, path, *, space="planar", load=None, **keys):
+def chain(count, link, path, *, space=planar, load=None, **keys):
     """Hinged links without gravity whose joints follow a path each, under a load on each."""
-    axis = {"axis": [0.0, 0.6, 0.8]} if space == "spatial" else {}
-    ends = ["ground", *(f"b{k}.tip" for k in range(count))]
-    scene = ffrobot.make_scene(
-        name="chain",
-        space=space,
-        gravity=[0.0, 0.0, 0.0][: 2 if space == "planar" else 3],
-        body=[{"name": f"b{k}", "link": link} for k in range(count)],
-        joint=[{"name": f"j{k}", "type": "revolute", "between": [ends[k], f"b{k}.root"], **axis} for k in range(count)],
+    axis, ends = {"axis": [0.0, 0.6, 0.8]} if space is scene else {}, ["ground", *(f"b{k}.tip" for k in range(count))]
+    tables = space(
+        [{"name": f"b{k}", "link": link} for k in range(count)],
+        [joint(f"j{k}", "revolute", ends[k], f"b{k}.root", **axis) for k in range(count)],
+        INVERSE | {"end": 1.0, "output_step": 0.05} | keys,
+        gravity=[0.0] * (3 if space is scene else 2),
         trajectory=[{"name": f"t{k}", "joint": f"j{k}", "value": path} for k in range(count)],
         load=[] if load is None else [{"joint": f"j{k}", "moment": load} for k in range(count)],
-        analysis=[{"name": "inv", "kind": "pcid", "end": 1.0, "output_step": 0.05, "max_steps": 20000, **keys}],
     )
-    return ffrobot.solve(scene)
+    return ffrobot.solve(ffrobot.make_scene(**tables))
 
 
-@pytest.mark.parametrize("space", ["planar", "spatial"])
+@pytest.mark.parametrize("space", [planar, scene])
 @pytest.mark.parametrize("rate", ["0", "0.1*t"])
 @pytest.mark.parametrize("load", ["80*exp(-((t - 0.50037)/0.002)**2)", "1e4*sin(20*t)"])
 def test_loads_that_motors_bear(space, rate, load):
@@ -116,8 +109,8 @@ def test_loads_that_motors_bear(space, rate, load):
     assert more <= 3 * steps
     t = loaded.time("inv")
     size = np.abs(given := np.array([eval(load, vars(np) | {"t": x}) for x in t])).max()
-    for joint in ("j0", "j1"):
-        added = loaded[f"inv/joints/{joint}/moment"] - alone[f"inv/joints/{joint}/moment"]
+    for name in ("j0", "j1"):
+        added = loaded[f"inv/joints/{name}/moment"] - alone[f"inv/joints/{name}/moment"]
         assert np.abs(added + given).max() < 1e-6 * size
 
 

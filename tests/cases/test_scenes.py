@@ -7,6 +7,7 @@ import tomli_w
 from beam_links import beam_link, circle
 from checkpoint_mechanisms import load
 from checkpoint_scene_files import close, write_scene
+from tables_3d import pin, planar
 
 from ffrobot import Results
 
@@ -81,18 +82,12 @@ def test_bodies_and_points(solved):
 def test_links_say_what_they_cannot_do_in_the_plane(tmp_path, ffrobot, family, is_rigid):
     """Likewise; and nothing is claimed of what modes that are not there would do."""
     link = beam_link(0.6, circle(0.02), 8, name="arm", modes={"count": 3, "family": family})
-    scene = {
-        "name": "arm",
-        "space": "planar",
-        "gravity": [0.0, -9.81],
-        "body": [{"name": "arm", "link": "arm.toml"}],
-        "joint": [{"name": "j", "type": "revolute", "between": ["ground", "arm.root"]}],
-        "initial": {"state": "static"},
-        "trajectory": [{"name": "path", "joint": "j", "value": "0.5*(10*t**3 - 15*t**4 + 6*t**5)"}],
-        "analysis": [{"name": "run", "kind": "pcid", "end": 1.0, "output_step": 0.1}],
-    }
-    for name, tables in (("arm", link), ("scene", scene)):
-        (tmp_path / f"{name}.toml").write_text(tomli_w.dumps(tables))
+    path = {"name": "path", "joint": "j", "value": "0.5*(10*t**3 - 15*t**4 + 6*t**5)"}
+    scene = planar(
+        [{"name": "arm", "link": link}], [pin("j", "ground", "arm.root")],
+        {"name": "run", "kind": "pcid", "end": 1.0, "output_step": 0.1}, initial={"state": "static"}, trajectory=[path],
+    )  # fmt: skip
+    (tmp_path / "scene.toml").write_text(tomli_w.dumps(scene))
     done = ffrobot.ok("solve", tmp_path / "scene.toml", "-o", tmp_path / "results.h5", "--verbose")
     told = " ".join(done.stdout.split())
     assert ("arm: rigid in in-plane-bending, of which its file has no modes" in told) == is_rigid

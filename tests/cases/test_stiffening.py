@@ -26,9 +26,8 @@ def blade(**tables):
     turning = {"name": "turning", "kind": "pcid", "end": 1e-3, "output_step": 1e-3}
     about = {"name": "about", "kind": "linear", "about": "turning", "times": [0.0]}
     keys = {"gravity": ORIGIN, "geometric_stiffening": True, "trajectory": [spin]}
-    return scene(
-        [{"name": "blade", "link": link()}], [revolute("hub", "ground", "blade.root")], turning, about
-    ) | keys | tables  # fmt: skip
+    bodies, joints = [{"name": "blade", "link": link()}], [revolute("hub", "ground", "blade.root")]
+    return scene(bodies, joints, turning, about, **keys | tables)
 
 
 def solve(**tables):
@@ -37,13 +36,7 @@ def solve(**tables):
 
 # Spin and frequencies over √(EI/ρAL⁴), hub radius 0: first and second flap (Wright, Smith, Thresher, Wang, Vibration
 # modes of centrifugally stiffened beams, J. Appl. Mech. 49, 1982).
-FLAP = {
-    1: (3.6816, 22.181),
-    2: (4.1373, 22.615),
-    3: (4.7973, 23.320),
-    6: (7.3604, 26.809),
-    12: (13.1702, 37.603),
-}
+FLAP = {1: (3.6816, 22.181), 2: (4.1373, 22.615), 3: (4.7973, 23.320), 6: (7.3604, 26.809), 12: (13.1702, 37.603)}
 
 
 @pytest.mark.parametrize("spin", FLAP)
@@ -83,13 +76,9 @@ def test_how_far_a_cantilever_bends_in_an_oblique_plane():
     EI, P = 7e10 * 0.01**4 / 12, 2.0
     wall = [{"name": "wall", "type": "weld", "between": ["ground", "blade.root"]}]
     force = {"y": repr(float(P * np.cos(0.8))), "z": repr(float(P * np.sin(0.8)))}
-    rest = {
-        "load": [{"point": "blade.tip", **force}],
-        "joint": wall,
-        "trajectory": [],
-        "analysis": [{"name": "rest", "kind": "static"}],
-    }
-    with solve(**blade(**rest)) as results:
+    rest = {"name": "rest", "kind": "static"}
+    tables = {"load": [{"point": "blade.tip", **force}], "joint": wall, "trajectory": [], "analysis": [rest]}
+    with solve(**blade(**tables)) as results:
         found = results.attributes("rest/bodies/blade")
     at = 1 - 1 / np.sqrt(3)
     from_chord = P / EI * (2 * at + at**3 - 3 * at**2) / 6

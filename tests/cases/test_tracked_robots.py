@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 from beam_links import link_keys, rectangle
 from patch_sets import amplifiers
+from tables_3d import ORIGIN, X, Z, joint, planar, rigid
+from tables_3d import pin as revolute
+from tables_3d import scene as spatial
 
 import ffrobot
 from ffrobot.mbs.inversion.motors_only import decay_times
@@ -21,7 +24,7 @@ from ffrobot.run.watcher import Watcher
 
 pytestmark = pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
 
-ORIGIN, ZETA = [0.0, 0.0, 0.0], 0.005
+ZETA = 0.005
 BOTH_PLANES = {"family": ["in-plane-bending", "out-of-plane-bending"], "count": 4}
 PART = {"structural": True, "density": 7600.0}
 
@@ -44,19 +47,12 @@ def patches(body, width, length=0.08, **keys):
     } | where | keys  # fmt: skip
 
 
-def revolute(name, inner, outer, **keys):
-    return {"name": name, "type": "revolute", "between": [inner, outer], **keys}
-
-
-def scene(T, gravity, trajectory, **tables):
+def scene(T, gravity, trajectory, body, joint, **tables):
     """The path, which is carried and replayed."""
     carried = {"name": "carried", "kind": "tracking", "end": T, "output_step": T / 20, "tolerance": 1e-5}
     replay = {"name": "replay", "kind": "forward", "actuation": "carried", "apply": "joints+pzt", "tolerance": 1e-8}
-    space = "planar" if len(gravity) == 2 else "spatial"
-    return {
-        "name": "robot", "space": space, "gravity": gravity, "trajectory": [{"name": "tip", **trajectory}],
-        "analysis": [carried, replay], **tables,
-    }  # fmt: skip
+    made, paths = planar if len(gravity) == 2 else spatial, [{"name": "tip", **trajectory}]
+    return made(body, joint, carried, replay, gravity=gravity, trajectory=paths, **tables)
 
 
 def in_plane(*layouts, solid=False, **tables):
@@ -71,13 +67,11 @@ def in_plane(*layouts, solid=False, **tables):
 
 def in_3d(*, solid=False, patch=None, **tables):
     """A rod on a waist and a shoulder, under gravity, with layouts in two planes."""
-    column = {"mass": 2.0, "center": [0.0, 0.0, 0.1], "inertia": [0.01, 0.01, 0.005]}
-    points = {"root": ORIGIN, "top": [0.0, 0.0, 0.2]}
     return scene(
         0.35, [0.0, 0.0, -9.81],
         {"point": "arm.tip", "y": f"0.45*{septic(0.35)}", "z": f"0.28 + 0.25*{septic(0.35)}"},
         body=[
-            {"name": "column", "rigid": column | {"points": points}},
+            rigid("column", 2.0, [0.01, 0.01, 0.005], [0.0, 0.0, 0.1], top=[0.0, 0.0, 0.2]),
             {"name": "arm", "link": strip(0.8, 0.006, 0.006, solid=solid, **BOTH_PLANES)},
         ],
         joint=[
@@ -100,14 +94,12 @@ def five_bar():
 
     at = [*angles(base / 2, 0.55, 1), *angles(-base / 2, 0.55, -1)]
     soft = strip(reach, 0.003, 0.015, count=1)
-    rigid = {
-        "mass": 0.05, "inertia": 0.05 * reach**2 / 12, "center": [reach / 2, 0.0],
-        "points": {"root": [0.0, 0.0], "tip": [reach, 0.0]},
-    }  # fmt: skip
+    points = {"root": [0.0, 0.0], "tip": [reach, 0.0]}
+    bar = {"mass": 0.05, "inertia": 0.05 * reach**2 / 12, "center": [reach / 2, 0.0], "points": points}
     sides = ("near", "far")
     return scene(
         T, [0.0, 0.0], {"point": "near_rod.tip", "x": f"0.15 + 0.1*{septic(T)}", "y": f"0.55 - 0.05*{septic(T)}"},
-        body=[{"name": k, "link": soft} for k in sides] + [{"name": f"{k}_rod", "rigid": rigid} for k in sides],
+        body=[{"name": k, "link": soft} for k in sides] + [{"name": f"{k}_rod", "rigid": bar} for k in sides],
         joint=[
             revolute("A", "ground", "near.root", motor=True), revolute("B", "near.tip", "near_rod.root"),
             revolute("D", "ground", "far.root", at=[base, 0.0], motor=True), revolute("E", "far.tip", "far_rod.root"),
@@ -121,9 +113,6 @@ def five_bar():
 def slider_crank(mass=0.01):
     """A soft crank about a slanted axis moves a slider beside it: a loop in 3D."""
     T = 0.25
-    rod = {"mass": mass, "center": [0.55, 0.0, 0.0], "inertia": [2e-4 * mass, 0.1 * mass, 0.1 * mass],
-           "points": {"root": ORIGIN, "tip": [1.1, 0.0, 0.0]}}  # fmt: skip
-    slider = {"mass": 0.05, "center": ORIGIN, "inertia": [1e-4] * 3, "points": {"pin": ORIGIN}}
     slanted = {  # about z of axes that the rotation vector (0.5, 0.2, 0) turns
         "axis": [0.19047253607043549, -0.47618134017608871, 0.85847046790847781],
         "rpy": [0.50643360053616981, 0.19164347241770835, 0.049733913986023531],
@@ -131,16 +120,15 @@ def slider_crank(mass=0.01):
     return scene(
         T, [0.0, 0.0, -9.81], {"point": "slider.pin", "x": f"1.0 - 0.15*{septic(T)}"},
         body=[
-            {"name": "crank", "link": strip(0.3, 0.004, 0.012, count=1)}, {"name": "rod", "rigid": rod},
-            {"name": "slider", "rigid": slider},
+            {"name": "crank", "link": strip(0.3, 0.004, 0.012, count=1)},
+            rigid("rod", mass, [2e-4 * mass, 0.1 * mass, 0.1 * mass], [0.55, 0.0, 0.0], tip=[1.1, 0.0, 0.0]),
+            rigid("slider", 0.05, [1e-4] * 3, pin=ORIGIN),
         ],
         joint=[
             revolute("crank", "ground", "crank.root", motor=True, **slanted),
-            {"name": "fork", "type": "universal", "between": ["crank.tip", "rod.root"], "axis": [0.0, 0.0, 1.0],
-             "second_axis": [0.0, -1.0, 0.0], "motor": False},
-            {"name": "ball", "type": "spherical", "between": ["rod.tip", "slider.pin"]},
-            {"name": "guide", "type": "prismatic", "between": ["ground", "slider.pin"], "at": [0.0, 0.075, 0.25],
-             "axis": [1.0, 0.0, 0.0], "motor": False},
+            joint("fork", "universal", "crank.tip", "rod.root", axis=Z, second_axis=[0.0, -1.0, 0.0], motor=False),
+            joint("ball", "spherical", "rod.tip", "slider.pin"),
+            joint("guide", "prismatic", "ground", "slider.pin", at=[0.0, 0.075, 0.25], axis=X, motor=False),
         ],
         initial={"state": "static", "joints": {"crank": 1.2, "fork": [-1.4, 0.2]}},
         pzt=[patches("crank", 0.012, 0.06)],
@@ -149,11 +137,11 @@ def slider_crank(mass=0.01):
 
 def geared(tables, f, **inertias):
     """With gears of f Hz, rotors behind a ratio of 100 and 2 % of damping in joints with so much inertia, kg·m²."""
-    for joint in tables["joint"]:
-        if (inertia := inertias.get(joint["name"])) is not None:
+    for one in tables["joint"]:
+        if (inertia := inertias.get(one["name"])) is not None:
             K = inertia * (2 * np.pi * f) ** 2
-            joint |= {"rotor_inertia": inertia / 1e4, "gear_ratio": 100.0, "stiffness": K}
-            joint |= {"damping": 0.04 * K / (2 * np.pi * f)}
+            one |= {"rotor_inertia": inertia / 1e4, "gear_ratio": 100.0, "stiffness": K}
+            one |= {"damping": 0.04 * K / (2 * np.pi * f)}
     return tables
 
 
@@ -246,8 +234,8 @@ def posed(tables):
 def moved_motors(*motors):
     """The five-bar with motors behind gears at these joints."""
     tables = five_bar()
-    for joint in tables["joint"]:
-        joint["motor"] = joint["name"] in motors
+    for one in tables["joint"]:
+        one["motor"] = one["name"] in motors
     return geared(tables, 40, **dict.fromkeys(motors, 0.02))
 
 

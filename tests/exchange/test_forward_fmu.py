@@ -10,8 +10,10 @@ import pytest
 import tomli_w
 from beam_links import beam_link, rectangle
 from fmpy import extract, read_model_description, simulate_fmu
-from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from fmpy.fmi2 import fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.validation import validate_fmu
+from running_fmus import running
+from tables_3d import Y, pin, revolute
 
 from ffrobot import InputError, Results
 from ffrobot.exchange.export import export_file
@@ -31,34 +33,23 @@ def box(**points):
     return {"mass": 0.4, "center": [0.1, 0.0, 0.01], "inertia": [2e-4, 1e-3, 1e-3], "points": points}
 
 
-def pin(name, first, second, axis=(0.0, 1.0, 0.0), **keys):
-    return {"name": name, "type": "revolute", "between": [first, second], "axis": list(axis), **keys}
-
-
-def flat_link(name, modes, **keys):
-    return link(name, modes, width=0.02, height=0.003, **keys)
-
-
 def flat_box(**points):
     return {"mass": 0.4, "center": [0.1, 0.02], "inertia": 2e-3, "points": points}
 
 
-def flat_pin(name, first, second, **keys):
-    return {"name": name, "type": "revolute", "between": [first, second], **keys}
-
-
+FLAT = {"width": 0.02, "height": 0.003}
 ROOT, TIP = [0.0, 0.0, 0.02], [0.3, 0.01, 0.0]
 PLANE = {"space": "planar", "gravity": [0.0, -9.81]}
 PLANAR = {
     # fewer modes than the link has, an outer first side, a rotor behind a stiff gear, friction, patches with mass and
     # stiffness, a payload with inertia, a weld and a way that are turned, a trajectory that nothing follows, rates
     "flat arm": PLANE | {
-        "body": [{"name": "upper", "link": flat_link("upper", 4), "modes": 2},
+        "body": [{"name": "upper", "link": link("upper", 4, **FLAT), "modes": 2},
                  {"name": "fore", "rigid": flat_box(root=[0.0, 0.0], tip=[0.3, 0.01])},
-                 {"name": "hand", "link": flat_link("hand", 1)}, {"name": "tool", "rigid": flat_box(a=[0.0, 0.1])}],
+                 {"name": "hand", "link": link("hand", 1, **FLAT)}, {"name": "tool", "rigid": flat_box(a=[0.0, 0.1])}],
         "joint": [
-            flat_pin("shoulder", "ground", "upper.root", at=[0.1, 0.2], viscous_friction=0.05),
-            flat_pin("elbow", "fore.root", "upper.tip", rotor_inertia=2e-5, gear_ratio=50.0),
+            pin("shoulder", "ground", "upper.root", at=[0.1, 0.2], viscous_friction=0.05),
+            pin("elbow", "fore.root", "upper.tip", rotor_inertia=2e-5, gear_ratio=50.0),
             {"name": "wrist", "type": "weld", "between": ["fore.tip", "hand.root"], "motor": False},
             {"name": "way", "type": "prismatic", "between": ["tool.a", "hand.tip"], "axis": [1.0, 2.0]},
         ],
@@ -76,8 +67,8 @@ PLANAR = {
     # implicit steps
     "flat rest": PLANE | {
         "geometric_stiffening": True,
-        "body": [{"name": "upper", "link": flat_link("upper", 1)}, {"name": "fore", "link": flat_link("fore", 1)}],
-        "joint": [flat_pin("pin", "ground", "upper.root", coulomb_friction=0.02),
+        "body": [{"name": name, "link": link(name, 1, **FLAT)} for name in ("upper", "fore")],
+        "joint": [pin("pin", "ground", "upper.root", coulomb_friction=0.02),
                   {"name": "bend", "type": "weld", "between": ["upper.tip", "fore.root"]}],
         "initial": {"state": "static", "joints": {"pin": -1.9}, "angles": {"fore": -0.8}},
     },
@@ -86,13 +77,13 @@ PLANAR = {
     "flat loop": PLANE | {
         "body": [{"name": "slider", "rigid": flat_box(pin=[0.0, 0.0])},
                  {"name": "crank", "rigid": flat_box(a=[0.0, 0.0], b=[0.1, 0.0])},
-                 {"name": "rod", "link": flat_link("rod", 1)}, {"name": "flyer", "rigid": flat_box()}],
+                 {"name": "rod", "link": link("rod", 1, **FLAT)}, {"name": "flyer", "rigid": flat_box()}],
         "joint": [
             {"name": "guide", "type": "prismatic", "between": ["ground", "slider.pin"], "axis": [1.0, 0.2],
              "viscous_friction": 0.4},
-            flat_pin("drive", "ground", "crank.a", motor=True),
-            flat_pin("knee", "crank.b", "rod.root", viscous_friction=0.002),
-            flat_pin("out", "slider.pin", "rod.tip", viscous_friction=0.003),
+            pin("drive", "ground", "crank.a", motor=True),
+            pin("knee", "crank.b", "rod.root", viscous_friction=0.002),
+            pin("out", "slider.pin", "rod.tip", viscous_friction=0.003),
         ],
         "initial": {"angles": {"crank": 1.2, "rod": -0.3, "flyer": 0.6}, "rates": {"flyer": 2.0}},
     },
@@ -104,8 +95,8 @@ SCENES = PLANAR | {
         "body": [{"name": "upper", "link": link("upper", 2, damping={"ratio": 0.02, "of": "robot"})},
                  {"name": "fore", "rigid": box(root=ROOT, tip=TIP)}],
         "joint": [
-            pin("shoulder", "ground", "upper.root", (0.1, 1.0, 0.2), viscous_friction=0.05),
-            pin("elbow", "fore.root", "upper.tip", rotor_inertia=2e-5, gear_ratio=50.0),
+            revolute("shoulder", "ground", "upper.root", [0.1, 1.0, 0.2], viscous_friction=0.05),
+            revolute("elbow", "fore.root", "upper.tip", Y, rotor_inertia=2e-5, gear_ratio=50.0),
         ],
         "pzt": [
             {"body": "upper", "bends": "out-of-plane", "centers": [0.06, 0.2, 0.34], "length": 0.06, "width": 0.01,
@@ -120,10 +111,9 @@ SCENES = PLANAR | {
         "body": [{"name": "upper", "link": link("upper", 2, reference={"condition": "craig-bampton"})},
                  {"name": "fore", "rigid": box(root=ROOT, tip=TIP)}],
         "joint": [
-            pin("shoulder", "ground", "upper.root", (0.0, 0.0, 1.0), stiffness=50.0, damping=0.05, rotor_inertia=1e-5,
-                gear_ratio=60.0),
-            pin("elbow", "upper.tip", "fore.root", (0.0, 0.0, 1.0), stiffness=30.0, rotor_inertia=1e-5,
-                gear_ratio=40.0),
+            revolute("shoulder", "ground", "upper.root", stiffness=50.0, damping=0.05, rotor_inertia=1e-5,
+                     gear_ratio=60.0),
+            revolute("elbow", "upper.tip", "fore.root", stiffness=30.0, rotor_inertia=1e-5, gear_ratio=40.0),
         ],
     },
     # a loop of four bars, one of them flexible, and joints of two and six coordinates
@@ -133,8 +123,8 @@ SCENES = PLANAR | {
                  {"name": "rocker", "rigid": box(a=[0.0, 0.0, 0.0], b=[0.3, 0.0, 0.0])},
                  {"name": "pendulum", "rigid": box(a=[0.0, 0.0, 0.1])}, {"name": "flyer", "rigid": box()}],
         "joint": [
-            pin("drive", "ground", "crank.a", motor=True), pin("knee", "crank.b", "coupler.root"),
-            pin("out", "ground", "rocker.a", at=[0.4, 0.0, 0.0]),
+            revolute("drive", "ground", "crank.a", Y, motor=True), revolute("knee", "crank.b", "coupler.root", Y),
+            revolute("out", "ground", "rocker.a", Y, at=[0.4, 0.0, 0.0]),
             {"name": "close", "type": "spherical", "between": ["rocker.b", "coupler.tip"]},
             {"name": "cross", "type": "universal", "between": ["rocker.b", "pendulum.a"], "axis": [0.0, 1.0, 0.0],
              "second_axis": [1.0, 0.0, 0.0]},
@@ -147,8 +137,8 @@ SCENES = PLANAR | {
         "body": [{"name": "upper", "link": link("upper", 2)}, {"name": "fore", "link": link("fore", 2)},
                  {"name": "tool", "rigid": box(root=ROOT, tip=TIP)}],
         "joint": [
-            pin("shoulder", "ground", "upper.root", (0.1, 1.0, 0.2)),
-            pin("elbow", "fore.root", "upper.tip", (0.0, 0.6, 0.8)),
+            revolute("shoulder", "ground", "upper.root", [0.1, 1.0, 0.2]),
+            revolute("elbow", "fore.root", "upper.tip", [0.0, 0.6, 0.8]),
             {"name": "grip", "type": "weld", "between": ["fore.tip", "tool.root"]},
         ],
         "initial": {"joints": {"shoulder": -0.4, "elbow": 0.7}},
@@ -266,91 +256,69 @@ def test_motion(robot, name):
 
 @pytest.fixture
 def slave(robot, tmp_path):
-    """The folder in which the arm's FMU is unpacked, one with blanks, what it logs, and what makes an instance."""
+    """The folder in which the arm's FMU is unpacked, one with blanks, what it logs, what runs it, and references."""
     folder, told = tmp_path / "an FMU, unpacked", []
     extract(str(robot("arm")[0]), str(folder))
-    return folder, told, lambda: instance_of(folder, told)
-
-
-def instance_of(folder, told):
-    description = read_model_description(str(folder))
-    found = FMU2Slave(
-        guid=description.guid, unzipDirectory=str(folder), instanceName="arm",
-        modelIdentifier=description.coSimulation.modelIdentifier,
-    )  # fmt: skip
-    callbacks = fmi2CallbackFunctions()
+    description, callbacks = read_model_description(str(folder)), fmi2CallbackFunctions()
     callbacks.logger = fmi2CallbackLoggerTYPE(lambda *values: told.append(values[-1].decode()))
-    found.instantiate(callbacks=callbacks)
-    found.setupExperiment(startTime=0.0)
-    found.enterInitializationMode()
-    found.exitInitializationMode()
-    return found, {each.name: each.valueReference for each in description.modelVariables}
+    reference = {each.name: each.valueReference for each in description.modelVariables}
+    return folder, told, lambda: running(description, folder, callbacks=callbacks), reference
 
 
 def test_reset_and_length_of_steps(slave):
     """The same again after a reset; held inputs in one step or in fifteen, to the tolerance."""
-    _, _, make = slave
-    instance, reference = make()
+    *_, start, reference = slave
     outputs = [reference[name] for name in ("joint/shoulder", "joint/elbow/rate", "point/fore.tip/z")]
-
-    def run(steps):
-        instance.setReal([reference["joint/elbow/moment"]], [-0.5])
-        for k in range(steps):
-            instance.doStep(k * 0.3 / steps, 0.3 / steps)
-        return np.array(instance.getReal(outputs))
-
-    first = run(1)
-    instance.reset()
-    assert instance.getReal([reference["joint/elbow/moment"]]) == [0.0]
-    again = run(1)
-    instance.reset()
-    np.testing.assert_array_equal(again, first)
-    np.testing.assert_allclose(run(15), first, rtol=1e-7)
-    instance.terminate()
-    instance.freeInstance()
+    motor, found = [reference["joint/elbow/moment"]], []
+    with start() as instance:
+        for steps in (1, 1, 15):
+            assert instance.getReal(motor) == [0.0]
+            instance.setReal(motor, [-0.5])
+            for k in range(steps):
+                instance.doStep(k * 0.3 / steps, 0.3 / steps)
+            found.append(instance.getReal(outputs))
+            instance.reset()
+    assert found[1] == found[0]
+    np.testing.assert_allclose(found[2], found[0], rtol=1e-7)
 
 
 def test_steps_that_are_repeated(slave):
     """Kept states bring back motion, inputs and step sizes: the same again to the last bit, also after a reset."""
-    _, told, make = slave
-    instance, reference = make()
+    _, told, start, reference = slave
     outputs = [reference[name] for name in ("joint/shoulder/rate", "point/fore.tip/z")]
-    motor = reference["joint/elbow/moment"]
-    instance.setReal([motor], [-0.5])
-    instance.doStep(0.0, 0.1)
-    kept, then = instance.getFMUstate(), instance.getReal(outputs)
-    found = []
-    for _ in range(2):
-        instance.doStep(0.1, 0.05)
-        instance.setReal([motor], [1.0])
-        instance.doStep(0.15, 0.05)
-        found.append(instance.getReal(outputs))
-        instance.reset()
-        instance.setFMUstate(kept)
-        assert instance.getReal([*outputs, motor]) == [*then, -0.5]
+    motor, found = reference["joint/elbow/moment"], []
+    with start() as instance:
+        instance.setReal([motor], [-0.5])
+        instance.doStep(0.0, 0.1)
+        kept, then = instance.getFMUstate(), instance.getReal(outputs)
+        for _ in range(2):
+            instance.doStep(0.1, 0.05)
+            instance.setReal([motor], [1.0])
+            instance.doStep(0.15, 0.05)
+            found.append(instance.getReal(outputs))
+            instance.reset()
+            instance.setFMUstate(kept)
+            assert instance.getReal([*outputs, motor]) == [*then, -0.5]
+        instance.freeFMUstate(kept)
+        with pytest.raises(Exception, match="fmi2SetFMUstate failed"):
+            instance.setFMUstate(None)
     assert found[0] == found[1] != then
-    instance.freeFMUstate(kept)
-    with pytest.raises(Exception, match="fmi2SetFMUstate failed"):
-        instance.setFMUstate(None)
     assert "expected a state of fmi2GetFMUstate, found none" in told[-1]
-    instance.terminate()
-    instance.freeInstance()
 
 
 def test_wrong_calls_and_files(slave):
     """Each is an error with a message in the log."""
-    folder, told, make = slave
-    instance, reference = make()
-    for call, message in (
-        (lambda: instance.setReal([reference["joint/shoulder"]], [1.0]), "expected a finite value of an input"),
-        (lambda: instance.setReal([0], [float("nan")]), "expected a finite value of an input"),
-        (lambda: instance.doStep(0.0, -1.0), "expected a step of zero or more seconds"),
-        (lambda: instance.getReal([10_000]), "expected a value reference of modelDescription.xml"),
-    ):
-        with pytest.raises(Exception, match="fmi2"):
-            call()
-        assert message in told[-1]
-    instance.freeInstance()
+    folder, told, start, reference = slave
+    with start() as instance:
+        for call, message in (
+            (lambda: instance.setReal([reference["joint/shoulder"]], [1.0]), "expected a finite value of an input"),
+            (lambda: instance.setReal([0], [float("nan")]), "expected a finite value of an input"),
+            (lambda: instance.doStep(0.0, -1.0), "expected a step of zero or more seconds"),
+            (lambda: instance.getReal([10_000]), "expected a value reference of modelDescription.xml"),
+        ):
+            with pytest.raises(Exception, match="fmi2"):
+                call()
+            assert message in told[-1]
     model = folder / "resources" / "model.bin"
     data = model.read_bytes()
     for content, message in (
@@ -361,12 +329,12 @@ def test_wrong_calls_and_files(slave):
         (data.replace(b"{", b"[", 1), "of another export"),
     ):
         model.write_bytes(content)
-        with pytest.raises(Exception, match="instantiate"):
-            make()
+        with pytest.raises(Exception, match="instantiate"), start():
+            pass
         assert message in told[-1]
     model.unlink()
-    with pytest.raises(Exception, match="instantiate"):
-        make()
+    with pytest.raises(Exception, match="instantiate"), start():
+        pass
     assert "model.bin of the FMU, found none" in told[-1]
 
 

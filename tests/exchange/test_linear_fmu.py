@@ -3,7 +3,6 @@
 import shutil
 import subprocess
 import zipfile
-from contextlib import contextmanager
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -15,6 +14,7 @@ from beam_links import beam_link, rectangle
 from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.validation import validate_fmu
+from running_fmus import instance, running
 from scipy.linalg import expm
 from scipy.signal import lsim
 
@@ -59,23 +59,6 @@ MOTOR, PATCH, FORCE, TIP = "joint/hub/moment", "pzt/arm/1", "force/arm.tip/y", "
 SENSORS = {"joint/hub/rate": "rad/s", f"{TIP}/accelerometer": "m/s2", "point/arm.tip/z/gyro": "rad/s"}
 STEP, COUNT = 1e-3, 400
 EXACT = 1e-11  # of the largest value: rounding of COUNT steps
-
-
-@contextmanager
-def running(description, unpacked, kind=FMU2Slave):
-    fmu = kind(
-        guid=description.guid, unzipDirectory=unpacked, modelIdentifier=description.coSimulation.modelIdentifier,
-        instanceName="robot",
-    )  # fmt: skip
-    fmu.instantiate()
-    try:
-        fmu.setupExperiment(startTime=0.0)
-        fmu.enterInitializationMode()
-        fmu.exitInitializationMode()
-        yield fmu
-        fmu.terminate()
-    finally:
-        fmu.freeInstance()
 
 
 class Robot:
@@ -286,8 +269,7 @@ def test_without_a_compiler_there_are_sources(robot, ffrobot, tmp_path, monkeypa
     with monkeypatch.context() as context:
         context.setenv("PATH", str(tmp_path / "bin"))
         context.delenv("CC", raising=False)
-        done = ffrobot("export", results, "--format", "fmu", "-o", tmp_path / "sources.fmu")
-    assert done.returncode == 0, done.stderr
+        done = ffrobot.ok("export", results, "--format", "fmu", "-o", tmp_path / "sources.fmu")
     assert "sources only, no binary: found no C compiler (cc, gcc, clang, or what CC names)" in done.stdout
     with zipfile.ZipFile(tmp_path / "sources.fmu") as file:
         assert sorted(file.namelist()) == ["modelDescription.xml", "sources/linear.c", "sources/model.h"]
@@ -304,10 +286,7 @@ def test_a_compiler_that_fails_is_told(robot, ffrobot, tmp_path, monkeypatch):
 
 
 def test_a_binary_of_another_export_does_not_start(robot, capfd):
-    fmu = FMU2Slave(
-        guid="{other}", unzipDirectory=robot.unpacked, instanceName="robot",
-        modelIdentifier=robot.description.coSimulation.modelIdentifier,
-    )  # fmt: skip
+    fmu = instance(robot.description, robot.unpacked, guid="{other}")
     with pytest.raises(Exception, match=r"[Ii]nstantiate"):
         fmu.instantiate()
     assert "the binary is of another export" in capfd.readouterr().out
@@ -327,18 +306,14 @@ def test_names_that_are_no_identifiers(tmp_path):
     assert len({each.name for each in variables}) == len(variables)
 
 
-def test_what_is_refused(robot, ffrobot, tmp_path):
-    results = robot.folder / "scene.results.h5"
-    refused = {
-        "along": "along: expected a linear model of one instant, found 2; solve with one in `times`",
-        "inverse": 'expected a linear analysis ("at_rest", "along"), found "inverse"',
-    }
-    for name, message in refused.items():
-        done = ffrobot("export", results, "--format", "fmu", "--analysis", name, "-o", tmp_path / "x.fmu")
-        assert done.returncode == 2
-        assert message in " ".join(done.stderr.split())
-        assert not (tmp_path / "x.fmu").exists()
-    shutil.copy(robot.folder / "scene.toml", tmp_path / "scene.toml")
-    done = ffrobot("export", results, "--format", "fmu", "-o", tmp_path / "scene.toml", "--force")
-    assert done.returncode == 2
-    assert "expected a new name or a file of kind zip" in " ".join(done.stderr.split())
+REFUSED = {
+    "along: expected a linear model of one instant, found 2; solve with one in `times`": ("--analysis", "along"),
+    'expected a linear analysis ("at_rest", "along"), found "inverse"': ("--analysis", "inverse"),
+    "expected a new name or a file of kind zip": ("-o", "scene.toml", "--force"),
+}
+
+
+def test_what_is_refused(robot, refused, tmp_path):
+    shutil.copy(robot.folder / "scene.toml", tmp_path)
+    for message, options in REFUSED.items():
+        assert message in refused(tmp_path, "export", robot.folder / "scene.results.h5", "--format", "fmu", *options)

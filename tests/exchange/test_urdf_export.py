@@ -10,6 +10,7 @@ import tomli_w
 import yourdfpy
 from beam_links import beam_link, tube
 from rigid_robots import moments, random_urdf, with_motion
+from scipy.spatial.transform import Rotation
 
 from ffrobot import InputError, Results
 from ffrobot.exchange.export import export_file
@@ -82,9 +83,7 @@ def test_places_by_yourdfpy(solved):
 
 def rotation(e):
     """Of a unit quaternion, w first."""
-    w, u = e[0], e[1:]
-    S = np.array([[0, -u[2], u[1]], [u[2], 0, -u[0]], [-u[1], u[0], 0]])
-    return np.eye(3) + 2 * w * S + 2 * S @ S
+    return Rotation.from_quat(np.roll(e, -1)).as_matrix()
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -142,10 +142,8 @@ def test_the_rest_of_a_flexible_link_stays_as_a_payload(tmp_path, ffrobot):
     assert np.abs(np.subtract(found["left"], wanted)).max() > 0.1
 
 
-def test_a_flexible_link_that_weighs_more_has_no_rest(tmp_path, ffrobot):
+def test_a_flexible_link_that_weighs_more_has_no_rest(tmp_path, refused):
     (tmp_path / "arm.urdf").write_text(ARM.replace(f'<mass value="{MASS!r}"/>', f'<mass value="{MASS / 2!r}"/>', 1))
     (tmp_path / "bar.toml").write_text(BAR)
-    done = ffrobot("import", "arm.urdf", "-o", "out", "--flexible", "upper=bar.toml", "--keep-rest", cwd=tmp_path)
-    assert done.returncode == 2
-    assert "expected a link file with less mass than the URDF" in done.stderr
-    assert not (tmp_path / "out").exists()
+    told = refused(tmp_path, "import", "arm.urdf", "-o", "out", "--flexible", "upper=bar.toml", "--keep-rest")
+    assert "expected a link file with less mass than the URDF" in told
