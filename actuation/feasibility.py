@@ -266,7 +266,7 @@ def judge_patches(
         current_limit=amplifiers.current,
         field=required / patches.layout.thickness,
         limited_field=np.abs(voltages.within_limit).max(axis=0) / patches.layout.thickness,
-        strain=patches.lever * (patches.height / 2 + patches.layout.layers * patches.layout.thickness) * curvature,
+        strain=patches.effects.lever * (patches.effects.extent / 2 + patches.layout.layers * patches.layout.thickness) * curvature,
         mode_required=mode_required,
         mode_available=mode_available,
         find_remedies=partial(_remedies, patches, required, limit, with_count),
@@ -292,7 +292,7 @@ def _remedies(
     """The limit, layers, thickness or count that alone would suffice, by c ∝ N (t_b + N t_p) for the worst patch."""
     k = int(np.argmax(required / limit))
     factor = float(required[k] / limit[k])
-    t_b, t_p, N = float(patches.height[k]), patches.layout.thickness, patches.layout.layers
+    t_b, t_p, N = float(patches.effects.extent[k]), patches.layout.thickness, patches.layout.layers
     lever = max(factor, 1.0) * N * (t_b + N * t_p)  # N' (t_b + N' t_p) of the layers that suffice
     layers = max(N, int(np.ceil((-t_b + np.sqrt(t_b**2 + 4 * t_p * lever)) / (2 * t_p) - 1e-9)))
     lever = max(factor, 1.0) * t_p * (t_b + N * t_p)  # t (t_b + N t) of the thickness that suffices
@@ -347,9 +347,8 @@ def judge_actuators(
         for name, array in of_link.arrays.items():
             if not array.layout.is_driven:
                 continue
-            modes = of_link.modes[name]
             trial = None if run.analysis.is_repeated else partial(_largest_voltage, path, run, link, array.layout)
-            p, F_p = modes.coordinates(link.p), modes.forces(link.F_p)
+            p, F_p = array.modes.coordinates(link.p), array.modes.forces(link.F_p)
             judged[name] = judge_patches(array, voltages[name], run.time, p, F_p, trial)
     return Feasibility(judge_motors(run), judged, find_unsupplied(run, links, patches, voltages, others))
 
@@ -364,7 +363,7 @@ def _largest_voltage(path: Path, run: Run, link: LinkInMotion, layout: PztLayout
         return None
     if link.spatial.name in run.model.tree.index:  # else in pieces, with all modes
         patches = on_kept_modes(patches, node_of(run, link.spatial.name).body)
-    return float(np.abs(patches.reached.forces(link.F_p) @ voltage_gain(patches.reach).T).max())
+    return float(np.abs(patches.reach.modes.forces(link.F_p) @ voltage_gain(patches.reach).T).max())
 
 
 def find_unmet(

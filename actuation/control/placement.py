@@ -372,7 +372,7 @@ class PatchPlacement(InstantAnalysis):
             run = of_earlier(source, self).at([row_at(model.scene.path, self, source, t) for t in self.times])
             of_link = _patches(context, wanted.body)
             modal = motor_forces(source.model, source.q, supplied_in(source)).modal
-            F_p = of_link.modes[link.layout.label].forces(of_link.on_link(modal))
+            F_p = of_link.arrays[link.layout.label].modes.forces(of_link.on_link(modal))
             return replace(run, details=place(model.scene.path, wanted, link, None, F_p))
         run, about = find_operating_points(context, self)
         at = LinearEquations(about.model, about.q[0]).at(float(about.time[0]), about.q[0], about.v[0], about.a[0])
@@ -393,7 +393,7 @@ def _deviation(
     read, wanted = (make_signals(plant, context, of) for of in (record.sensor, (tip,)))
     known = model_of_filter(record, robot, 0, [*read, *wanted])
     to_file = robot.model.tree.nodes[robot.model.tree.index[link.name]].body.modal_transform
-    own = _patches(context, link.name).modes[link.layout.label].coordinates(to_file.T).T
+    own = _patches(context, link.name).arrays[link.layout.label].modes.coordinates(to_file.T).T
     columns = [k for k, name in enumerate(known.state_names) if name.startswith(f"modal/{link.name}/")]
     own = own[:, : len(columns)]  # the lowest modes are kept
     as_sensor = Sensor(pzt=link.layout.label, noise=record.noise)
@@ -432,14 +432,14 @@ def _link(context: ActuatedContext, wanted: Placement) -> PatchableLink:
         raise InputError(
             f'{path}: placement.pzt: expected one of the layouts {quoted(of_link.arrays)} of "{name}"', found
         )
-    reached, layout = of_link.modes[label], of_link.arrays[label].layout
+    reached, layout = of_link.arrays[label].modes, of_link.arrays[label].layout
 
     def patches(**changes: object) -> PatchArray:
         one = layout.with_one_limit(**({"mode_weights": None, "point_weights": None} | changes))
-        found = link_patches(path, [one], body, context.carrying[name])
-        if not np.array_equal(found.modes[label].rows, reached.rows):
+        found = link_patches(path, [one], body, context.carrying[name]).arrays[label]
+        if not np.array_equal(found.modes.rows, reached.rows):
             raise InputError(f'{path}: placement.body: expected patches that excite the modes of "{label}"')
-        return found.arrays[label]
+        return found
 
     own = reached.coordinates(to_file.T).T
     return PatchableLink(

@@ -175,7 +175,7 @@ class ControlledRobot:
         """Patches by link, with the modes that its layouts reach together."""
         signals = {}
         for name, of_link in self.of_links.items():
-            counts, reached = {layout: len(of.edges) for layout, of in of_link.arrays.items()}, of_link.reached
+            counts, reached = {layout: len(of.edges) for layout, of in of_link.arrays.items()}, of_link.reach.modes
             volts = [volts_on_file(of_link, layout)[name] for layout in counts]
             to_file = self.model.tree.nodes[self.model.tree.index[name]].body.modal_transform
             signals[name] = PatchSignals(
@@ -183,7 +183,7 @@ class ControlledRobot:
                 layouts=tuple(counts),
                 omega=np.sqrt(reached.stiffness[: reached.served]),
                 gain=voltage_gain(of_link.reach),
-                volts=reached.seen(np.vstack(volts)),
+                volts=reached.forces(np.vstack(volts)),
                 own=reached.coordinates(to_file.T).T,
             )
         return signals

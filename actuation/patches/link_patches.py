@@ -58,10 +58,8 @@ class LinkPatches:
     Voltages serve the modes of the link. They act on whichever of the `bodies` a model has: the link, or its pieces.
     """
 
-    arrays: Mapping[str, PatchArray]  # by layout, each on the modes that it reaches, `modes`
-    modes: Mapping[str, ReachedModes]  # by layout
-    reach: Reach  # of all patches side by side on the modes that they reach together, `reached`
-    reached: ReachedModes  # likewise
+    arrays: Mapping[str, PatchArray]  # by layout, each on the modes that it reaches
+    reach: Reach  # of all patches side by side on the modes that they reach together
     bodies: Mapping[str, OnBody]  # by name, the link and, where it is divided, its pieces
     slowness: float  # √(ρA/EI) of the link, in s/m²
     # (n, n) of modal forces the part that the equations keep, where the patches serve that alone
@@ -79,7 +77,7 @@ class LinkPatches:
 
     def voltages(self, F_p: Array) -> dict[str, Voltages]:
         """Return the voltages by layout for modal forces F_p (T, n), N/√kg; `unmet`: what all layouts leave."""
-        found = solve_voltages(self.reach, self.reached.forces(F_p))
+        found = solve_voltages(self.reach, self.reach.modes.forces(F_p))
         return self._by_layout(found.required, found.within_limit, F_p)
 
     @property
@@ -103,9 +101,9 @@ class LinkPatches:
 
     def _by_layout(self, required: Array, within: Array, F_p: Array) -> dict[str, Voltages]:
         unmet, found = self.unmet(F_p, within), {}
-        for name, modes in self.modes.items():
+        for name, array in self.arrays.items():
             own = np.s_[:, self.columns(name)]
-            found[name] = Voltages(required[own], within[own], modes.forces(unmet), modes.served)
+            found[name] = Voltages(required[own], within[own], array.modes.forces(unmet), array.served)
         return found
 
     @property
@@ -115,8 +113,8 @@ class LinkPatches:
 
     @property
     def to_reached(self) -> dict[str, Array]:
-        """Matrices (m, n) by body, from modal forces on the modes of its file to those on `reached`."""
-        return {name: self.reached.forces(of.to_link.T).T for name, of in self.bodies.items()}
+        """Matrices (m, n) by body, from modal forces on the modes of its file to those on the modes of `reach`."""
+        return {name: self.reach.modes.forces(of.to_link.T).T for name, of in self.bodies.items()}
 
     def on_link(self, modal: Mapping[str, Array]) -> Array:
         """Modal forces (T, n), N/√kg, on the modes of the link's file, by those of bodies that carry it on theirs."""
@@ -124,7 +122,7 @@ class LinkPatches:
         return as_floats(np.sum(found, axis=0))
 
     def allocation(self, *, limited: bool) -> _core.Allocation:
-        """Return the map from modal forces on `reached`, N/√kg, to voltages (k,), V, within limits or without."""
+        """Return the map from modal forces on the modes of `reach`, N/√kg, to voltages (k,), V, within limits or without."""
         return allocation(self.reach, limited=limited)
 
     def placed_on(self, start: float, length: float) -> list[tuple[Indices, PlacedLayout]]:
@@ -188,15 +186,9 @@ def link_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody, spat
     found = effects(key, placed, body)
     charge, turn = (np.concatenate(of).T for of in ([one.Phi_V for one in found], [one.turn for one in found]))
     yielding, driven = np.concatenate([one.yielding for one in found]), driven_patches(placed)
-    modes = {one.layout.label: reached_modes(of.Phi_V, body, spatial) for one, of in zip(placed, found, strict=True)}
-    arrays = {
-        one.layout.label: _array(path, one, body, spatial, of, modes[one.layout.label])
-        for one, of in zip(placed, found, strict=True)
-    }
-    reach: Reach
-    if len(layouts) == 1:
-        reached, reach = modes[layouts[0].label], arrays[layouts[0].label]
-    else:
+    arrays = {one.layout.label: _array(path, one, body, spatial, of) for one, of in zip(placed, found, strict=True)}
+    reach: Reach = next(iter(arrays.values()))
+    if len(layouts) > 1:
         reached = reached_modes((charge * driven if driven.any() else charge).T, body, spatial)
         reach = _together(path, layouts, arrays, reached, charge.T)
     if not driven.all():
@@ -205,7 +197,7 @@ def link_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody, spat
     # √(ρA/EI) of the mode that bends the link most softly: ω² = ∫ EI φ''² dx
     bent = np.diff(body.stations.rotation[:, 1:], axis=0) ** 2 / np.diff(body.stations.position[:, 0])[:, None, None]
     softest = (bent.sum(axis=(0, 1)) / np.diag(body.stiffness)).max(initial=0.0)
-    return LinkPatches(arrays, modes, reach, reached, own, float(np.sqrt(body.mass / body.length * softest)))
+    return LinkPatches(arrays, reach, own, float(np.sqrt(body.mass / body.length * softest)))
 
 
 def check_reach(path: Path, of_link: LinkPatches) -> None:
@@ -221,7 +213,8 @@ def check_reach(path: Path, of_link: LinkPatches) -> None:
     if k < n:
         raise InputError(f"{key}: expected as many patches as modes ({n}) or more", f"{k}: add patches, {advice}")
     if (unreached := reach.unreached_modes).size:
-        modes = ", ".join(f"{j + 1} ({reach.frequency[j]:.4g} Hz)" for j in unreached)
+        frequency = np.sqrt(reach.modes.stiffness) / (2 * np.pi)
+        modes = ", ".join(f"{j + 1} ({frequency[j]:.4g} Hz)" for j in unreached)
         condition = min(reach.condition_number, 1e16)  # beyond is round-off
         raise InputError(
             f"{key}: expected patches that excite every mode",
@@ -274,31 +267,25 @@ def with_count(path: Path, layout: PztLayout, body: ModalBody, spatial: Body, co
         return None
 
 
-def _array(
-    path: Path, placed: PlacedLayout, body: ModalBody, spatial: Body, of: Effects, modes: ReachedModes
-) -> PatchArray:
-    (layout, edges), key = placed, _key(path, placed.layout.label)
+def _array(path: Path, placed: PlacedLayout, body: ModalBody, spatial: Body, of: Effects) -> PatchArray:
+    (layout, edges), key, modes = placed, _key(path, placed.layout.label), reached_modes(of.Phi_V, body, spatial)
     if not modes.served:
         families = ", ".join(dict.fromkeys(map(str, body.family[: body.eigenmode_count]))) or "none"
         raise InputError(
             f'{key}: bends: expected eigenmodes of the link that patches for "{layout.bends}" reach',
             f"eigenmodes in {families}: add such modes ([modes] family, a larger count), or move the patches",
         )
-    points = {name: modes.seen(at.translation @ spatial.on_file) for name, at in spatial.points.items()}
+    points = {name: modes.forces(at.translation @ spatial.on_file) for name, at in spatial.points.items()}
     return PatchArray(
-        layout=layout,
-        edges=edges,
-        height=of.extent,
-        moment_per_volt=of.per_volt,
-        turn=modes.seen(of.turn).T,
-        link=body,
-        lever=of.lever,
-        read_capacitance=layout.read_capacitance(of.yielding),
-        Phi_V=modes.seen(of.Phi_V).T,
+        modes=modes,
+        Phi_V=modes.forces(of.Phi_V).T,
         amplifiers=layout.amplifiers(),
         W_sqrt=weights(key, layout, modes.served, modes.stiffness, points),
-        frequency=np.sqrt(modes.stiffness) / (2 * np.pi),
-        served=modes.served,
+        layout=layout,
+        edges=edges,
+        effects=of,
+        turn=modes.forces(of.turn).T,
+        link=body,
     )
 
 
@@ -310,14 +297,8 @@ def _together(
         if layout.mode_weights is not None or layout.point_weights is not None:
             beside = f'with other layouts on "{layout.body}"'
             raise InputError(f"{_key(path, layout.label)}: expected no weights {beside}", "them")
-    Phi_V = reached.seen(per_volt).T
-    return Reach(
-        Phi_V=Phi_V,
-        amplifiers=joined(arrays.values()),
-        W_sqrt=served_first(reached.served, *Phi_V.shape),
-        frequency=np.sqrt(reached.stiffness) / (2 * np.pi),
-        served=reached.served,
-    )
+    Phi_V = reached.forces(per_volt).T
+    return Reach(reached, Phi_V, joined(arrays.values()), served_first(reached.served, *Phi_V.shape))
 
 
 def _key(path: Path, label: str) -> str:
@@ -332,37 +313,21 @@ def on_kept_modes(of_link: LinkPatches, equations: Body) -> LinkPatches:
     """
     if equations.reduction is None or of_link.reach.serves_all:
         return of_link
-    modes = {layout: _kept(reached, equations) for layout, reached in of_link.modes.items()}
-    reached = _kept(of_link.reached, equations)
     on_link, arrays = of_link.bodies[of_link.body], {}
     for layout, array in of_link.arrays.items():
-        columns, kept = of_link.columns(layout), modes[layout]
-        changes = _on_kept(array, of_link.modes[layout], kept, on_link.Phi_V[:, columns], equations)
-        arrays[layout] = replace(array, turn=kept.seen(on_link.turn[:, columns].T).T, **changes)
-    reach = replace(of_link.reach, **_on_kept(of_link.reach, of_link.reached, reached, on_link.Phi_V, equations))
-    on_kept = as_floats(equations.modal_transform @ equations.on_file)
-    return replace(of_link, arrays=arrays, modes=modes, reach=reach, reached=reached, on_kept=on_kept)
+        columns = of_link.columns(layout)
+        changed = replace(array, **_on_kept(array, on_link.Phi_V[:, columns], equations))
+        arrays[layout] = replace(changed, turn=changed.modes.forces(on_link.turn[:, columns].T).T)
+    reach = replace(of_link.reach, **_on_kept(of_link.reach, on_link.Phi_V, equations))
+    return replace(of_link, arrays=arrays, reach=reach, on_kept=equations.modal_transform @ equations.on_file)
 
 
-def _columns(reached: ReachedModes, equations: Body) -> Indices:
-    """Numbers of the coordinates kept that move the link in these modes above all."""
-    squares = equations.modal_transform**2
-    return np.flatnonzero(squares[reached.rows].sum(axis=0) > 0.5 * squares.sum(axis=0))
-
-
-def _kept(reached: ReachedModes, equations: Body) -> ReachedModes:
-    columns = _columns(reached, equations)
+def _on_kept(reach: Reach, Phi_V: Array, equations: Body) -> dict[str, Any]:
+    """Fields of a `reach` on the coordinates kept that move the link in its modes; Φ_V is on the modes of the file."""
+    squares, reached = equations.modal_transform**2, reach.modes
+    columns = np.flatnonzero(squares[reached.rows].sum(axis=0) > 0.5 * squares.sum(axis=0))
     T = equations.modal_transform[np.ix_(reached.rows, columns)]
     served = int(np.count_nonzero(columns < equations.n_eigenmodes))
-    return ReachedModes(reached.rows, T, equations.stiffness[columns], served)
-
-
-def _on_kept(reach: Reach, reached: ReachedModes, kept: ReachedModes, Phi_V: Array, equations: Body) -> dict[str, Any]:
-    """Fields of a `reach` on the modes `kept` of those `reached`; Φ_V is on the modes of the file."""
-    lift = reached.forces(equations.on_file[_columns(reached, equations)]).T  # forces on all that patches reach
-    return {
-        "Phi_V": kept.seen(Phi_V.T).T,
-        "W_sqrt": reach.W_sqrt @ lift,
-        "frequency": np.sqrt(kept.stiffness) / (2 * np.pi),
-        "served": kept.served,
-    }
+    modes = ReachedModes(reached.rows, T, equations.stiffness[columns], served)
+    lift = reached.forces(equations.on_file[columns]).T  # forces on all that patches reach
+    return {"modes": modes, "Phi_V": modes.forces(Phi_V.T).T, "W_sqrt": reach.W_sqrt @ lift}

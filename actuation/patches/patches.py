@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import KW_ONLY
 from functools import cached_property, lru_cache
 from itertools import pairwise
 
@@ -18,13 +17,39 @@ from ...mbs import _core
 from ...mbs.model.amplifiers import Amplifiers
 from ...mbs.model.body import Body
 from ...mbs.model.masses import uncoupling
-from .composite import PlacedLayout, stiffness_ratios
+from .composite import Effects, PlacedLayout, stiffness_ratios
 from .records import PztLayout
 
 SINGULAR = 1e12  # condition number of Φ_V beyond which voltages are round-off
 LEAST_WEIGHT = 1e-6  # of any mode, relative to the largest: without it voltages would be neither unique nor steady
 OF_STATIC_SHAPES = 1e-3  # root of the weight of attachment modes beside modes: more patches than modes serve them last
 ENERGY_WEIGHT = 1e-4  # of the strain energy rᵀ K⁻¹ r beside weights of points, for the same reason
+
+
+@struct
+class ReachedModes:
+    """Modes of a link that moves in some families of modes only, in coordinates p' that decouple them.
+
+    Attributes:
+        rows: (m,) numbers (from 0) of the modes of the modal body in these families.
+        T: (m, m) p of these rows from p', in which m_ff is the identity and K_ff diagonal; (m, fewer) where equations
+            keep fewer, see `link_patches.on_kept_modes`.
+        stiffness: (m,) of the p', rad²/s².
+        served: number of the p', the first ones, that are no attachment modes.
+    """
+
+    rows: Indices
+    T: Array
+    stiffness: Array
+    served: int
+
+    def forces(self, F_p: Array) -> Array:
+        """Return modal forces (T, m) on p', N/√kg, or other rows linear in modes, from those on the body's (T, n)."""
+        return F_p[:, self.rows] @ self.T
+
+    def coordinates(self, p: Array) -> Array:
+        """Return p' (T, m), m·√kg, from modal coordinates of the modal body (T, n)."""
+        return as_floats(np.linalg.lstsq(self.T, p[:, self.rows].T, rcond=None)[0].T)
 
 
 @struct
@@ -35,16 +60,17 @@ class Reach:
         Phi_V: (n, k) modal forces per volt, N/(√kg·V).
         amplifiers: of the k patches.
         W_sqrt: (rows, n) |W_sqrt r|² of the modal forces r left unmet is made small.
-        frequency: (n,) of the modes, Hz.
-        served: number of modes, the first ones, that the patches are to serve: attachment modes are not among them.
     """
 
-    _: KW_ONLY
+    modes: ReachedModes
     Phi_V: Array
     amplifiers: Amplifiers
     W_sqrt: Array
-    frequency: Array
-    served: int
+
+    @property
+    def served(self) -> int:
+        """Number of modes, the first ones, that the patches are to serve: attachment modes are not among them."""
+        return self.modes.served
 
     @property
     def limit(self) -> Array:
@@ -108,36 +134,6 @@ def weights(key: str, layout: PztLayout, served: int, stiffness: Array, points: 
 
 
 OUT_OF_REACH = 1e-9  # of the largest modal force per volt: less is round-off
-
-
-@struct
-class ReachedModes:
-    """Modes of a link that moves in some families of modes only, in coordinates p' that decouple them.
-
-    Attributes:
-        rows: (m,) numbers (from 0) of the modes of the modal body in these families.
-        T: (m, m) p of these rows from p', in which m_ff is the identity and K_ff diagonal; (m, fewer) where equations
-            keep fewer, see `link_patches.on_kept_modes`.
-        stiffness: (m,) of the p', rad²/s².
-        served: number of the p', the first ones, that are no attachment modes.
-    """
-
-    rows: Indices
-    T: Array
-    stiffness: Array
-    served: int
-
-    def forces(self, F_p: Array) -> Array:
-        """Return modal forces (T, m) on p', N/√kg, from those on the modes of the modal body (T, n)."""
-        return F_p[:, self.rows] @ self.T
-
-    def coordinates(self, p: Array) -> Array:
-        """Return p' (T, m), m·√kg, from modal coordinates of the modal body (T, n)."""
-        return as_floats(np.linalg.lstsq(self.T, p[:, self.rows].T, rcond=None)[0].T)
-
-    def seen(self, rows: Array) -> Array:
-        """Return rows (k, n), linear in the modes of the modal body, as rows (k, m) of p'."""
-        return self.forces(rows)
 
 
 def reached_modes(per_volt: Array, body: ModalBody, spatial: Body) -> ReachedModes:
@@ -228,22 +224,26 @@ class PatchArray(Reach):
     Attributes:
         layout: the keys of the scene.
         edges: (k, 2) where each patch begins and ends along the link, m.
-        height: (k,) t_b, of the link along their normal under each patch, its mean, m.
-        moment_per_volt: (k,) c in N·m/V.
-        turn: (n, k) φ'(x2) − φ'(x1) of the n modes of the body, rad per unit of modal coordinate; of twist φ_x.
+        effects: on the modes of the `link`.
+        turn: (n, k) φ'(x2) − φ'(x1) of the n `modes`, rad per unit of modal coordinate; of twist φ_x.
         link: the modal body of the link that they are on.
-        lever: (k,) strain of the surface by unit turn per length and distance: 1 of bending.
-        read_capacitance: (k,) F, as sensors; see `PztLayout.read_capacitance`.
     """
 
     layout: PztLayout
     edges: Array
-    height: Array
-    moment_per_volt: Array
+    effects: Effects
     turn: Array
     link: ModalBody
-    lever: Array
-    read_capacitance: Array
+
+    @property
+    def moment_per_volt(self) -> Array:
+        """Loads c (k,) along the strain that each patch actuates, N·m/V."""
+        return self.effects.per_volt
+
+    @property
+    def read_capacitance(self) -> Array:
+        """Capacitances (k,) as sensors, F."""
+        return self.layout.read_capacitance(self.effects.yielding)
 
     @cached_property
     def _stiffness(self) -> tuple[Array, Array]:

@@ -86,5 +86,5 @@ def _sections(of_link: LinkPatches, link: ModalBody, spatial: Body, p: Array, lo
     array = _in_plane(of_link, spatial)
     if array is None or not np.isfinite(array.authority).all():
         return None
-    F_p = of_link.reached.forces(loads.modal_force @ spatial.on_file)
+    F_p = of_link.reach.modes.forces(loads.modal_force @ spatial.on_file)
     return section_loads(PlacedLayout(array.layout, array.edges), link, p, F_p @ voltage_gain(of_link.reach).T)

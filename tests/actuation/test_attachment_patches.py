@@ -82,6 +82,6 @@ def test_weights_of_all_modes_hold_for_those_kept(bodies, fewer, weights):
     F_kept = np.random.default_rng(3).standard_normal((6, fewer.n_modes))
     V = kept.voltages(F_kept @ fewer.on_file)["link"].required
     Phi = fewer.modal_transform.T @ whole.Phi_V  # what is seen of the patches
-    rows = whole.reach.W_sqrt @ whole.reached.forces(fewer.on_file).T
+    rows = whole.reach.W_sqrt @ whole.reach.modes.forces(fewer.on_file).T
     expected = np.array([np.linalg.lstsq(rows @ Phi, rows @ F, rcond=None)[0] for F in F_kept])
     np.testing.assert_allclose(V, expected, rtol=1e-7, atol=1e-9 * np.abs(expected).max())

@@ -68,7 +68,7 @@ def test_patches_that_only_bend_leave_axial_modes_as_they_are(all_modes):
     F_p = np.random.default_rng(4).standard_normal((2, len(all_modes.family)))
     for face, rows in ((None, bending), ("+y", moving)):
         of_link = on_link(all_modes, count=len(moving), face=face)
-        assert list(of_link.reached.rows) == list(rows)
+        assert list(of_link.reach.modes.rows) == list(rows)
         check_reach(SCENE, of_link)
         left = of_link.unmet(F_p, of_link.voltages(F_p)["link"].required)
         np.testing.assert_allclose(left[:, rows], 0.0, atol=1e-8)
