@@ -246,7 +246,7 @@ def judge_patches(
     `with_count(k)`: the largest voltage (V) of k such patches, evenly spread; None where they have no room. Without
     it no other numbers of patches are tried.
     """
-    amplifiers, pace = patches.amplifiers, 1.0 / np.diff(time)[:, None]
+    amplifiers, layout, pace = patches.amplifiers, patches.layout, 1.0 / np.diff(time)[:, None]
     required, limit = worst(voltages.required, amplifiers.range)
     charge = voltages.required * amplifiers.capacitance + p @ patches.Phi_V
     slew, current = (np.abs(np.diff(of, axis=0) * pace) for of in (voltages.required, charge))
@@ -255,7 +255,7 @@ def judge_patches(
     toward = [np.where(sign * patches.Phi_V > 0.0, *amplifiers.range[::-1]) for sign in (-1.0, 1.0)]
     of_modes = np.array([(patches.Phi_V * V).sum(axis=1) for V in toward])
     mode_required, mode_available = worst(F_p[:, : patches.served], of_modes[:, : patches.served])
-    curvature = np.abs(p @ patches.turn).max(axis=0) / patches.layout.length
+    curvature = np.abs(p @ patches.turn).max(axis=0) / layout.length
     return PatchFeasibility(
         required_moment=np.abs(patches.moment_per_volt) * required,
         available_moment=np.abs(patches.moment_per_volt) * limit,
@@ -264,9 +264,9 @@ def judge_patches(
         slew_limit=amplifiers.slew,
         current=current.max(axis=0, initial=0.0),
         current_limit=amplifiers.current,
-        field=required / patches.layout.thickness,
-        limited_field=np.abs(voltages.within_limit).max(axis=0) / patches.layout.thickness,
-        strain=patches.effects.lever * (patches.effects.extent / 2 + patches.layout.layers * patches.layout.thickness) * curvature,
+        field=required / layout.thickness,
+        limited_field=np.abs(voltages.within_limit).max(axis=0) / layout.thickness,
+        strain=patches.effects.lever * (patches.effects.extent / 2 + layout.layers * layout.thickness) * curvature,
         mode_required=mode_required,
         mode_available=mode_available,
         find_remedies=partial(_remedies, patches, required, limit, with_count),

@@ -31,7 +31,7 @@ from ...mbs.run.replay import replay_times, supplied
 from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches
 from .controllers import ComputedTorqueControl, Controller, PythonControl, make_controllers
-from .linear import voltages_at
+from .linear import with_voltages
 from .linear_model import LinearModel, state_space
 from .loop import AmplifiedLoop, Loop, between, held_commands, loop_record, times_of_run
 from .margins import MOST, Feedback, eigenvalue_count, lowest_frequency
@@ -194,7 +194,7 @@ def loop_models(
         linearisation, found = LinearEquations(model, reference.q[0]), []
         for k in rows:
             at = linearisation.at(float(time[k]), reference.q[k], rest, rest)
-            found.append(state_space(at, voltages_at(model, at, patches), readings_at(model, at, read)))
+            found.append(state_space(with_voltages(model, at, patches), readings_at(model, at, read)))
         return tuple(found)
     return ()
 

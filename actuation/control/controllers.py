@@ -331,14 +331,14 @@ def design_model(record: Lqr, setup: Setup, beside: Sequence[JointPid]) -> Linea
 
     Springs and dampers replace the controllers `beside`, without sampling and delay.
     """
-    mechanism, voltages = setup.robot.linear(int(np.argmin(np.abs(setup.source.time - record.time))))
-    mechanism, voltages = kept_modes(mechanism, voltages, record.modes)
+    row = int(np.argmin(np.abs(setup.source.time - record.time)))
+    mechanism = kept_modes(setup.robot.linear(row), record.modes)
     for pid in beside:
         for joint, name in setup.robot_coordinates(pid.joints):
             held = np.outer(mechanism.inputs[f"joint/{name}"], mechanism.outputs[f"{pid.side}/{name}"])
             spring, damper = pid.proportional.get(joint, 0.0), pid.derivative.get(joint, 0.0)
             mechanism = replace(mechanism, K=mechanism.K + spring * held, D=mechanism.D + damper * held)
-    return state_space(mechanism, voltages)
+    return state_space(mechanism)
 
 
 def _weights(record: Lqr, setup: Setup, model: LinearModel, inputs: Sequence[str]) -> tuple[Array, Array]:

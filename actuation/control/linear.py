@@ -5,7 +5,6 @@ from dataclasses import replace
 from itertools import combinations, groupby
 from typing import Literal
 
-from ...common.arrays import Array
 from ...common.structs import struct
 from ...mbs.analysis.operating_points import InstantAnalysis, find_operating_points, places_of
 from ...mbs.fields.field_types import PointReference, Reference, under
@@ -66,7 +65,7 @@ class LinearModels(Details):
 
 def _pairs(model: LinearModel) -> list[tuple[str, ...]]:
     """(inputs …, outputs …), as many of each; where all would take minutes, without those to other outputs."""
-    motors = [name for name in model.input_names if name.startswith("joint/")]
+    motors = model.motors
     places = [name for name in model.output_names if name.startswith("point/") and name.count("/") == 2]  # no sensors
     own = [(motor, motor) for motor in motors]
     single = [(motor, output) for motor in motors for output in (motor, *places)]
@@ -105,12 +104,11 @@ class Linear(InstantAnalysis):
         free = about.model
         linearization = LinearEquations(free, about.q[0], places_of(context, self.points))
         states = zip(about.time, about.q, about.v, about.a, strict=True)
-        mechanisms = [linearization.at(float(t), q, v, a) for t, q, v, a in states]
+        mechanisms = [
+            with_voltages(free, linearization.at(float(t), q, v, a), context.patches) for t, q, v, a in states
+        ]
         signals = make_signals(free, context, self.sensor, context.whole)
-        models = tuple(
-            state_space(one, voltages_at(free, one, context.patches), readings_at(free, one, signals))
-            for one in mechanisms
-        )
+        models = tuple(state_space(one, readings_at(free, one, signals)) for one in mechanisms)
         acting = [name for name in models[0].input_names if not name.startswith("force/")]
         seen = [name for name in models[0].output_names if not name.startswith("modal/")]
         details = LinearModels(
@@ -128,11 +126,11 @@ class Linear(InstantAnalysis):
         return replace(run, details=details)
 
 
-def voltages_at(model: Model, mechanism: LinearMechanism, patches: Mapping[str, LinkPatches]) -> dict[str, Array]:
-    """Return generalized forces (f,) along s of 1 V by name "pzt/LAYOUT/k", N·m/V or their like."""
-    found: dict[str, Array] = {}
+def with_voltages(model: Model, mechanism: LinearMechanism, patches: Mapping[str, LinkPatches]) -> LinearMechanism:
+    """Return the mechanism with inputs "pzt/LAYOUT/k" behind its motors: generalized forces of 1 V along s."""
+    found = {name: column for name, column in mechanism.inputs.items() if name.startswith("joint/")}
     for of_link in patches.values():
         along_s = model.modal_directions(of_link.per_volt) @ mechanism.transformation
         for layout in of_link.arrays:
             found |= {f"pzt/{layout}/{k}": row for k, row in enumerate(along_s[of_link.columns(layout)], 1)}
-    return found
+    return replace(mechanism, inputs={**found, **mechanism.inputs})

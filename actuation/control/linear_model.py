@@ -134,11 +134,20 @@ class LinearModel(StateSpace):
         """Number f of independent coordinates."""
         return len(self.mass)
 
+    @property
+    def motors(self) -> tuple[str, ...]:
+        """Names of the inputs that are torques of motors."""
+        return tuple(name for name in self.input_names if name.startswith("joint/"))
+
+    @cached_property
+    def of_unit_mass(self) -> Array:
+        """L⁻ᵀ (f, f) with mass = L Lᵀ: s from coordinates z of unit mass."""
+        return np.linalg.inv(np.linalg.cholesky(self.mass).T)
+
     @cached_property
     def second_order(self) -> tuple[Array, Array, Array, Array]:
-        """K̂ (f, f) rad²/s², D̂ (f, f) 1/s, inputs (f, …), outputs (…, f) for unit mass: s = L⁻ᵀ z, mass = L Lᵀ."""
-        f, L_T = self.freedom, np.linalg.cholesky(self.mass).T
-        inverse = np.linalg.inv(L_T)
+        """K̂ (f, f) rad²/s², D̂ (f, f) 1/s, inputs (f, …), outputs (…, f) for unit mass."""
+        f, L_T, inverse = self.freedom, np.linalg.cholesky(self.mass).T, self.of_unit_mass
         A_K, A_D = L_T @ self.A[f:, :f] @ inverse, L_T @ self.A[f:, f:] @ inverse
         inputs, outputs = L_T @ self.B[f:], self.C[:, :f] @ inverse
         return -1.0 * A_K, -1.0 * A_D, inputs, outputs
@@ -149,25 +158,18 @@ class LinearModel(StateSpace):
         s, f = 1j * np.asarray(omega)[:, None, None], self.freedom
         columns, rows = self.inputs(inputs), self.outputs(outputs)
         X = np.linalg.solve(s**2 * np.eye(f) + s * D + K, B[None, :, columns])
-        back = np.linalg.inv(np.linalg.cholesky(self.mass).T) @ X
-        C = self.C[rows]
+        back, C = self.of_unit_mass @ X, self.C[rows]
         return np.asarray((C[:, :f] + s * C[:, f:]) @ back + self.D[np.ix_(rows, columns)], dtype=complex)
 
 
 def state_space(
-    mechanism: LinearMechanism,
-    voltages: Mapping[str, Array],
-    readings: Mapping[str, tuple[Array, Array, Array]] = MappingProxyType({}),
+    mechanism: LinearMechanism, readings: Mapping[str, tuple[Array, Array, Array]] = MappingProxyType({})
 ) -> LinearModel:
-    """Return the state space of a linear mechanism with voltages and sensors.
+    """Return the state space of a linear mechanism with sensors.
 
-    `voltages` by name: generalized forces (f,) of 1 V along s, N·m/V or their like. `readings` by name: derivatives
-    (f,) of each output by s, ṡ and s̈.
+    `readings` by name: derivatives (f,) of each output by s, ṡ and s̈.
     """
-    f = len(mechanism.M)
-    motors = {name: column for name, column in mechanism.inputs.items() if name.startswith("joint/")}
-    forces = {name: column for name, column in mechanism.inputs.items() if name not in motors}
-    inputs = {**motors, **voltages, **forces}
+    f, inputs = len(mechanism.M), mechanism.inputs
     modal = {name: row for name, row in zip(mechanism.names, np.eye(f), strict=True) if name.startswith("modal/")}
     none = np.zeros(f)
     outputs = {name: (row, none, none) for name, row in (*mechanism.outputs.items(), *modal.items())} | dict(readings)
@@ -198,13 +200,11 @@ def is_kept(name: str, modes: int) -> bool:
     return kind != "modal" or int(rest[1]) <= modes
 
 
-def kept_modes(
-    mechanism: LinearMechanism, voltages: Mapping[str, Array], modes: int
-) -> tuple[LinearMechanism, Mapping[str, Array]]:
-    """Truncate a linear mechanism to the lowest `modes` of each link; `voltages` as in `state_space`."""
+def kept_modes(mechanism: LinearMechanism, modes: int) -> LinearMechanism:
+    """Truncate a linear mechanism to the lowest `modes` of each link."""
     chosen = [j for j, name in enumerate(mechanism.names) if is_kept(name, modes)]
     block = np.ix_(chosen, chosen)
-    kept = replace(
+    return replace(
         mechanism,
         M=mechanism.M[block],
         D=mechanism.D[block],
@@ -217,7 +217,6 @@ def kept_modes(
         points={name: rows[:, chosen] for name, rows in mechanism.points.items()},
         names=tuple(mechanism.names[i] for i in chosen),
     )
-    return kept, {name: column[chosen] for name, column in voltages.items()}
 
 
 def save_arrays(arrays: Mapping[str, Any], path: Path) -> None:
@@ -267,14 +266,14 @@ OUT_OF_REACH = 1e-7  # of the largest effect that a unit input can have on a mod
 def robot_modes(model: LinearModel) -> RobotModes:
     """Return poles (1/s) and shapes of a model, about a frozen configuration."""
     K, D, _, _ = model.second_order
-    return modes_of(K, D, np.linalg.inv(np.linalg.cholesky(model.mass)).T, model.transformation)
+    return modes_of(K, D, model.of_unit_mass, model.transformation)
 
 
 @kept
 def locked_frequencies(model: LinearModel) -> Array:
     """Return undamped frequencies (k,), Hz, the lowest first, with all motor shafts locked: of NᵀK̂ N, BᵀN = 0."""
     K, _, B, _ = model.second_order
-    N = free_directions(B[:, [k for k, name in enumerate(model.input_names) if name.startswith("joint/")]].T)
+    N = free_directions(B[:, model.inputs(model.motors)].T)
     omega = np.sqrt(np.linalg.eigvalsh(N.T @ (K + K.T) @ N / 2).clip(min=0.0))
     return as_floats(omega[omega > RIGID * omega.max(initial=0.0)] / (2 * np.pi))
 
@@ -299,9 +298,7 @@ def controllability(model: LinearModel, inputs: Names) -> Reachability:
 
 def observability(model: LinearModel, outputs: Names) -> Reachability:
     """Return observability by mode, as `controllability` with the rows of outputs, those of rates times λ."""
-    f = model.freedom
-    inverse = np.linalg.inv(np.linalg.cholesky(model.mass).T)
-    C = np.vstack([inverse.T @ model.C[:, :f].T, inverse.T @ model.C[:, f:].T])
+    C = np.vstack([model.of_unit_mass.T @ part.T for part in np.split(model.C, 2, axis=1)])
     return _reach(model, _scaled(C, model.output_names)[:, model.outputs(outputs)], left=False)
 
 

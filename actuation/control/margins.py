@@ -42,7 +42,7 @@ class Feedback:
     B: Array
     C: Array
     D: Array
-    # of commands and readings; a reading's rate is "NAME/rate", its acceleration "NAME/acceleration"
+    # of commands and readings; a reading's rate is "NAME/rate"
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     # (2, inputs) time constants and further delays of commands behind amplifiers, s; None without
@@ -85,7 +85,7 @@ def joint_gains(model: LinearModel, records: Sequence[JointPid], T: float) -> Fe
 
     −u = P y + D ẏ + D' (y − y₋)/T + I Σ T y with states y₋ and Σ T y.
     """
-    inputs = tuple(model.input_names[k] for k in _motor_inputs(model))
+    inputs = model.motors
     P, D, difference, integral = (np.zeros((len(inputs), len(model.output_names))) for _ in range(4))
     for record in records:
         for joint in record.joints:
@@ -105,10 +105,6 @@ def joint_gains(model: LinearModel, records: Sequence[JointPid], T: float) -> Fe
         np.hstack([difference / T, -integral])[:, used], np.hstack([-P - difference / T - T * integral, -D]),
         inputs, names,
     )  # fmt: skip
-
-
-def _motor_inputs(model: LinearModel) -> list[int]:
-    return [k for k, name in enumerate(model.input_names) if name.startswith("joint/")]
 
 
 def spectral_radius(model: LinearModel, feedback: Feedback, T: float, delay: float) -> float:
@@ -188,16 +184,11 @@ def _readings(model: LinearModel, names: Sequence[str]) -> tuple[Array, Array]:
     """What sensors read of states (readings, 2f), and of inputs (readings, inputs)."""
     f, seen, felt = model.freedom, np.zeros((len(names), len(model.A))), np.zeros((len(names), model.B.shape[1]))
     for row, name in enumerate(names):
-        of, _, order = name.rpartition("/")
         if name in model.output_names:
             k = model.outputs(name)[0]
             seen[row], felt[row] = model.C[k], model.D[k]
-            continue
-        along = model.C[model.outputs(of if order in ("rate", "acceleration") else name)[0], :f]
-        if order == "acceleration":
-            seen[row], felt[row] = along @ model.A[f:], along @ model.B[f:]
         else:
-            seen[row, f * (order == "rate") :][:f] = along
+            seen[row, f:] = model.C[model.outputs(name.removesuffix("/rate"))[0], :f]
     return seen, felt
 
 
@@ -267,9 +258,8 @@ def joint_inertia(model: LinearModel) -> Array | None:
     None unless motors are coordinates.
     """
     names = model.state_names[: model.freedom]
-    motors = [model.input_names[k] for k in _motor_inputs(model)]
-    T = np.zeros((model.freedom, len(motors)))
-    for k, motor in enumerate(motors):
+    T = np.zeros((model.freedom, len(model.motors)))
+    for k, motor in enumerate(model.motors):
         for name in (motor, motor.replace("joint/", "motor/", 1)):
             if name in names:
                 T[names.index(name), k] = 1.0
@@ -296,7 +286,7 @@ def suggested_gains(
     J = np.max(known, axis=0)
     lowest = min((locked_frequencies(model).min(initial=np.inf) for model in models), default=np.inf)
     omega = 2 * np.pi * min(FRACTION * lowest, 1 / (SAMPLES * T))
-    names = [models[0].input_names[k].removeprefix("joint/") for k in _motor_inputs(models[0])]
+    names = [name.removeprefix("joint/") for name in models[0].motors]
     for _ in range(most_times):
         P, D = ({n: float(f"{v:.2g}") for n, v in zip(names, of, strict=True)} for of in (J * omega**2, 2 * J * omega))
         if min(*P.values(), *D.values()) < SMALLEST:
@@ -329,11 +319,10 @@ def light_roots(models: Sequence[LinearModel]) -> list[str]:
     found: dict[str, None] = {}
     for model in models:
         rigid = joint_inertia(model)
-        for k, column in enumerate(_motor_inputs(model)):
-            name = model.input_names[column]
+        for k, name in enumerate(model.motors):
             if rigid is None or name not in model.output_names:
                 continue
-            rate = model.C[model.outputs(name)[0], : model.freedom] @ model.B[model.freedom :, column]
+            rate = model.C[model.outputs(name)[0], : model.freedom] @ model.B[model.freedom :, model.inputs(name)[0]]
             alone = 1 / np.linalg.inv(rigid)[k, k]
             if rate * alone * LIGHT > 1.0:
                 found[name.removeprefix("joint/")] = None

@@ -364,8 +364,8 @@ def model_of_filter(record: FilterRecord, robot: ControlledRobot, row: int, sign
 
     Its links have their lowest modes alone; forces that `record` names are inputs, too.
     """
-    mechanism, voltages = kept_modes(*robot.linear(row, record.points), record.modes)
-    return state_space(mechanism, voltages, readings_at(with_compliance(robot.model), mechanism, signals))
+    mechanism = kept_modes(robot.linear(row, record.points), record.modes)
+    return state_space(mechanism, readings_at(with_compliance(robot.model), mechanism, signals))
 
 
 def kalman_filters(

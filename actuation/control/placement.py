@@ -377,7 +377,7 @@ class PatchPlacement(InstantAnalysis):
         run, about = find_operating_points(context, self)
         at = LinearEquations(about.model, about.q[0]).at(float(about.time[0]), about.q[0], about.v[0], about.a[0])
         deviation = None if wanted.estimate is None else _deviation(context, wanted.estimate, link, run)
-        return replace(run, details=place(model.scene.path, wanted, link, state_space(at, {}), None, deviation))
+        return replace(run, details=place(model.scene.path, wanted, link, state_space(at), None, deviation))
 
 
 def _deviation(

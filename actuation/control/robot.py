@@ -26,7 +26,7 @@ from ...mbs.run.record import Run
 from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches
 from ..patches.patches import voltage_gain
-from .linear import voltages_at
+from .linear import with_voltages
 from .records import Controller, JointPid, Lqr, ModalVelocity, PythonController, Sensor
 from .signals import check_joint, volts_on_file
 
@@ -188,18 +188,13 @@ class ControlledRobot:
             )
         return signals
 
-    def linear(
-        self, row: int, points: Mapping[str, str] = MappingProxyType({})
-    ) -> tuple[LinearMechanism, Mapping[str, Array]]:
-        """Linearize about output `row` of the motion, with `points` as in `LinearEquations`.
-
-        Returns the mechanism, and generalized forces (f,) of 1 V along s by voltage name, N·m/V or their like.
-        """
+    def linear(self, row: int, points: Mapping[str, str] = MappingProxyType({})) -> LinearMechanism:
+        """Linearize about output `row` of the motion, with `points` as in `LinearEquations`; voltages are inputs."""
         plant = with_compliance(self.model)
         moved = with_motor_coordinates(self.source, plant)
         linearisation = LinearEquations(plant, moved.q[row], points)
         found = linearisation.at(float(self.source.time[row]), moved.q[row], moved.v[row], moved.a[row])
-        return found, voltages_at(plant, found, self.of_links)
+        return with_voltages(plant, found, self.of_links)
 
     def rigid(self) -> RigidArm:
         """Return the robot with rigid links at the start. Raises `InputError` if motors do not fit the mechanism."""

@@ -122,7 +122,7 @@ class LinkPatches:
         return as_floats(np.sum(found, axis=0))
 
     def allocation(self, *, limited: bool) -> _core.Allocation:
-        """Return the map from modal forces on the modes of `reach`, N/√kg, to voltages (k,), V, within limits or without."""
+        """Return the map from modal forces on the modes of `reach`, N/√kg, to voltages (k,), V, limited or not."""
         return allocation(self.reach, limited=limited)
 
     def placed_on(self, start: float, length: float) -> list[tuple[Indices, PlacedLayout]]:

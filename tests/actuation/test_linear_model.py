@@ -30,7 +30,7 @@ def at_rest(robot, points=("link2.tip",)):
     model = robot.model.without_paths()
     state = undeformed_posture(model)
     rest = np.zeros(len(state.v))
-    return state_space(LinearEquations(model, state.q, points).at(0.0, state.q, rest, rest), {})
+    return state_space(LinearEquations(model, state.q, points).at(0.0, state.q, rest, rest))
 
 
 def hub_and_beam(ratio, modes=8, damping_ratio=0.0):

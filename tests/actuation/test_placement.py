@@ -28,7 +28,7 @@ def arm(cantilever):
     )  # fmt: skip
     model = build_model(scene, [planar])
     rest = np.zeros(model.tree.n_v)
-    return modal, planar, state_space(LinearEquations(model, rest).at(0.0, rest, rest, rest), {})
+    return modal, planar, state_space(LinearEquations(model, rest).at(0.0, rest, rest, rest))
 
 
 def link_of(modal, planar, count):
