@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal, Self, get_args
 import numpy as np
 from pydantic import model_validator
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array
 from ...common.deferred import Deferred
 from ...common.keys import DirectionInPlane
 from ...common.rotations import exponential, quaternions, unit
@@ -172,7 +172,7 @@ class SphericalJoint(JointRecord):
 
     def velocity(self, rates: Array) -> Array:
         """Return the angular velocity (3,), rad/s, in axes of the second side."""
-        return as_floats(self.orientation @ rates)
+        return self.orientation @ rates
 
 
 class PlanarJoint(AxialJoint):

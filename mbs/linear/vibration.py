@@ -11,9 +11,8 @@ from ...common.arrays import Array, null_space
 from ...common.errors import InputError, quoted
 from ...common.structs import struct
 from ..model.gears import with_prescribed_motors
-from ..model.known_motion import State
+from ..model.known_motion import State, mass_matrices
 from ..model.model import Model
-from ..model.system import MultibodySystem
 from ..model.tree import KinematicTree
 from ..posture.redundancy import resolved
 from ..posture.start import relaxed_gears, undeformed_posture
@@ -34,23 +33,16 @@ class Vibrations(NamedTuple):
     springs: Array
 
 
-def without_rows(model: Model) -> MultibodySystem:
-    """The mechanism that follows nothing and whose loops are open."""
-    return MultibodySystem(replace(model, rows=()))
-
-
-def vibrations_of(model: Model, unconstrained: MultibodySystem, t: float, q: Array) -> Vibrations:
+def vibrations_of(model: Model, t: float, q: Array) -> Vibrations:
     """Vibrations about q (n_q,), rad and m, under the constraint equations of `model` at time t, s.
 
-    M⁻¹ is what the core says that forces do to accelerations where `unconstrained`. K are the stiffnesses of links and
-    gears, D their damping and viscous friction; neither gravity nor dry friction.
+    K are the stiffnesses of links and gears, D their damping and viscous friction; neither gravity nor dry friction.
     """
-    still, sizes = np.zeros(model.tree.n_v), model.natural_sizes
+    sizes = model.natural_sizes
     both = np.outer(sizes, sizes)
-    M = np.linalg.inv(unconstrained.core.derivatives(unconstrained.scene, t, q, still, still).a_f / both)
+    M = mass_matrices(model, q[None], t)[0] * both
     (C_v,) = model.constraints.natural_gradients(q[None], np.array([t]), sizes)
     K, D = gear_matrices(model.tree, q)
-    D += model.along_cut.damping(q)
     for node in model.tree.nodes:
         K[node.p_v, node.p_v] = np.diag(node.body.stiffness)
         D[node.p_v, node.p_v] = node.body.damping
@@ -58,7 +50,7 @@ def vibrations_of(model: Model, unconstrained: MultibodySystem, t: float, q: Arr
             D[column, column] += friction.viscous
     squares, shape = elastic_shapes((M + M.T) / 2, K * both, C_v)
     omega, shape = np.sqrt(squares), sizes[:, None] * shape
-    ratio = np.einsum("in,ij,jn->n", shape, D, shape) / (2 * omega)
+    ratio = np.einsum("in,ij,jn->n", shape, D + model.along_cut.damping(q), shape) / (2 * omega)
     return Vibrations(omega, ratio, shape, K)
 
 
@@ -105,7 +97,6 @@ def frequencies_along(model: Model, begin: float, end: float, modes: int) -> Pat
     Raises `InputError` where the path is out of reach, or there are fewer vibrations.
     """
     model = with_prescribed_motors(resolved(model, end))
-    unconstrained = without_rows(model)
     state, spectra = undeformed_posture(model), []
     for t in np.linspace(begin, end, INSTANTS):
         q = model.constraints.posture(state.q, float(t))
@@ -116,7 +107,7 @@ def frequencies_along(model: Model, begin: float, end: float, modes: int) -> Pat
                 f" {quoted(dict.fromkeys(row.owner for row in model.rows))}",
             )
         state = relaxed_gears(model, State(q, np.zeros_like(state.v)))
-        spectra.append(vibrations_of(model, unconstrained, float(t), state.q)[:2])
+        spectra.append(vibrations_of(model, float(t), state.q)[:2])
     most = min(len(omega) for omega, _ in spectra)
     if most < modes:
         raise InputError(
@@ -137,7 +128,7 @@ def with_robot_damping(model: Model, ratios: Mapping[str, float]) -> Model:
     if not ratios:
         return model
     start, tree = undeformed_posture(model), model.tree
-    modes = vibrations_of(model.without_paths(), without_rows(model), 0.0, start.q)
+    modes = vibrations_of(model.without_paths(), 0.0, start.q)
     # D (modes of all bodies)² with ΦᵀDΦ = diag(2ω), ζ = 1, of which each body has its block on the diagonal; rigid
     # motion is free of it, and so is motion of p that the joints do not allow
     inverse, bodies = np.linalg.pinv(modes.shape[~tree.joint_columns]), [node.body for node in tree.nodes]

@@ -16,7 +16,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array
 from ...common.structs import struct
 
 MOST_PLAYS = 32
@@ -49,7 +49,7 @@ class Hysteresis:
 
     def acting(self, plays: Array) -> Array:
         """Return the voltages (…, k) that patches act under, Σ w z, of `plays` (…, MOST_PLAYS, k), V."""
-        return as_floats((self.weights * plays).sum(axis=-2))
+        return (self.weights * plays).sum(axis=-2)
 
     def output(self, V: Array) -> Array:
         """Return the voltages (T, k) that patches act under of V (T, k), V, straight between these, from rest."""
@@ -178,4 +178,4 @@ def joined(links: Iterable[Driven]) -> Amplifiers:
     none = {field.name: np.zeros(0) for field in fields(Amplifiers)}
     none |= {"range": np.zeros((2, 0)), "plays": np.zeros((2, MOST_PLAYS, 0))}
     parts = [none, *(vars(of_link.amplifiers) for of_link in links)]
-    return Amplifiers(**{key: as_floats(np.concatenate([of[key] for of in parts], axis=-1)) for key in none})
+    return Amplifiers(**{key: np.concatenate([of[key] for of in parts], axis=-1) for key in none})

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.rotations import about, of_rpy, skew
 from ...common.structs import struct
@@ -80,7 +80,7 @@ class Stiffening:
         turning = np.einsum("am,bn->abmn", phi, phi)  # φ_a φ_b
         turning = 0.5 * (turning + turning.transpose(1, 0, 2, 3))
         by_arm = np.einsum("lab,amn->lbmn", LEVI_CIVITA, self.at(point)[3:])
-        return as_floats(by_arm + np.einsum("lb,aamn->lbmn", np.eye(3), turning) - turning)
+        return by_arm + np.einsum("lb,aamn->lbmn", np.eye(3), turning) - turning
 
 
 def stiffening_of(body: ModalBody, *, is_planar: bool) -> Stiffening | None:
@@ -172,8 +172,8 @@ class Body(Invariants):
         Of a body with fewer modes they are those of loads at its loaded points, which act on all modes.
         """
         if self.reduction is not None:
-            return as_floats(self.reduction.lift.T @ self.whole.on_file)
-        return as_floats(np.linalg.pinv(self.modal_transform))
+            return self.reduction.lift.T @ self.whole.on_file
+        return np.linalg.pinv(self.modal_transform)
 
     @property
     def inertia(self) -> Array:
@@ -332,26 +332,21 @@ def _spin_inertia(name: str, body: ModalBody, *, is_planar: bool) -> tuple[float
     )
 
 
-class Section(NamedTuple):
-    """Section of a bent body: u = x + Φp − … (…, 3), m, φ = Φ_r p − … (…, 3), and ∂/∂p (…, 3, n) or (3, n)."""
+class BentSection(NamedTuple):
+    """Section of a bent body: u = x + Φp − … (…, 3), m, and φ = Φ_r p − … (…, 3)."""
 
     u: Array
     phi: Array
-    u_p: Array
-    phi_p: Array
 
 
-def bent_section(body: Body, point: str, p: Array) -> Section:
+def bent_section(body: Body, point: str, p: Array) -> BentSection:
     """Return a point of a body in its axes, bent by p (…, n), √kg·m."""
     at = body.points[point]
     u, phi = at.position + p @ at.translation.T, p @ at.rotation.T
     if body.stiffening is None:
-        return Section(u, phi, at.translation, at.rotation)
-    K_p = np.einsum("kmn,...n->...km", body.stiffening.at(point), p)
-    second = 0.5 * np.einsum("...km,...m->...k", K_p, p)
-    return Section(
-        u - second[..., :3], phi - second[..., 3:], at.translation - K_p[..., :3, :], at.rotation - K_p[..., 3:, :]
-    )
+        return BentSection(u, phi)
+    second = 0.5 * np.einsum("kmn,...m,...n->...k", body.stiffening.at(point), p, p)
+    return BentSection(u - second[..., :3], phi - second[..., 3:])
 
 
 def orientation(tool: Tool) -> Array:

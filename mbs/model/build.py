@@ -25,7 +25,7 @@ from ..scene.trajectories import Trajectory
 from .body import Body
 from .masses import welded_payloads
 from .model import Model
-from .nodes import ConstraintRow, Section, coordinate_row
+from .nodes import ConstraintRow, Section, rows_of_joint
 from .tree import KinematicTree, cut_coordinates, cut_row, loop_rows, with_auxiliary_rotors
 
 
@@ -82,7 +82,8 @@ def row_of_joint(tree: KinematicTree, joint: JointRecord, owner: str, target: Ti
     if joint.name not in tree.carried:
         return replace(cut_row(tree, joint), owner=owner, is_trajectory=True, target=target)
     node = tree.nodes[tree.carried[joint.name]]
-    return coordinate_row(owner, node, target, sign=node.sign)
+    (row,) = rows_of_joint(owner, node, np.r_[node.v], [target], node.sign)
+    return row
 
 
 def _check_points(scene: MechanismScene, bodies: dict[str, Body]) -> None:

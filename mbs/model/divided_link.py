@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array
 from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
 from .body import Body, BodyPoint
@@ -73,7 +73,7 @@ def spread_of(link: ModalBody, pieces: Sequence[tuple[float, ModalBody]]) -> Arr
 
 
 def _shape_in_piece(link: ModalBody, start: float, piece: ModalBody) -> Array:
-    x = as_floats(np.linspace(0.0, piece.length, INTERVALS + 1))
+    x = np.linspace(0.0, piece.length, INTERVALS + 1)
     of_link = _changes(link, np.minimum(start + x, link.length))
     return np.asarray(np.linalg.lstsq(_changes(piece, x), of_link, rcond=None)[0])
 

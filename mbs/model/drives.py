@@ -50,7 +50,6 @@ class Replayed(NamedTuple):
 class Drives(NamedTuple):
     """All forces acting in a run in addition to the loads of the scene."""
 
-    along: tuple[Drive, ...] = ()
     at_points: tuple[PointDrive, ...] = ()
     replayed: Replayed | None = None
 

@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array
 from ...common.structs import struct
 from .. import _core
 from .model import Model
@@ -176,4 +176,4 @@ def mass_matrices(model: Model, q: Array, t: float = 0.0) -> Array:
     system, a = MultibodySystem(model), np.tile(np.vstack([np.zeros(n), np.eye(n)]), (T, 1))
     states = np.repeat(q, n + 1, axis=0), np.zeros((T * (n + 1), n)), a
     f = system.core.required_forces(system.scene, [t] * len(a), *states).reshape(T, n + 1, n)
-    return as_floats(np.swapaxes(f[:, 1:] - f[:, :1], 1, 2))
+    return np.swapaxes(f[:, 1:] - f[:, :1], 1, 2)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
 
@@ -22,13 +22,11 @@ LARGEST_TURN = 0.5  # rad (and sizes of the robot) that a Newton step may move: 
 
 
 class Constraints(Kinematics):
-    """Equations C(q, t) = 0 of `rows`, SI; natural sizes of rows (rows,) and joints (n_v,)."""
+    """Equations C(q, t) = 0 of all rows of a model, SI."""
 
-    def __init__(
-        self, tree: KinematicTree, rows: Sequence[ConstraintRow], row_sizes: Array, joint_sizes: Array
-    ) -> None:
-        super().__init__(tree.nodes, rows=rows)
-        self._rows, self._row_sizes, self._joint_sizes = rows, row_sizes, joint_sizes
+    def __init__(self, model: Model) -> None:
+        super().__init__(model.tree.nodes, rows=model.rows)
+        self._rows, self._row_sizes, self._joint_sizes = model.rows, model.row_sizes, model.joint_sizes
 
     @cached_property
     def _senses(self) -> tuple[list[str], Kinematics]:
@@ -124,7 +122,7 @@ class Model:
     @cached_property
     def constraints(self) -> Constraints:
         """The constraint rows in the core."""
-        return Constraints(self.tree, self.rows, self.row_sizes, self.joint_sizes)
+        return Constraints(self)
 
     @cached_property
     def along_cut(self) -> AlongCut:

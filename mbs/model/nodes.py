@@ -1,6 +1,7 @@
 """What trees are made of: bodies on their joints, sections of bodies, and rows of constraints between these."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -90,16 +91,6 @@ class ConstraintRow:
     law: OrientationLaw | None = None
 
 
-def coordinate_row(
-    owner: str, node: Node, target: TimeFunction | None = None, column: int | None = None, sign: float = 1.0
-) -> ConstraintRow:
-    """Return the row by which `sign` · v[`column`] of a node's joint, by default its first, follows `target`."""
-    k, none = node.v.start if column is None else column, np.zeros(3)
-    return ConstraintRow(
-        owner, "coordinate", node.inner, node.outer, none, none, coordinate=k, sign=sign, target=target
-    )
-
-
 def rows_of_joint(
     owner: str, node: Node, columns: Array, targets: Sequence[TimeFunction | None], sign: float = 1.0
 ) -> list[ConstraintRow]:
@@ -108,8 +99,9 @@ def rows_of_joint(
     Of planar joints between its sections, `sign` 1: the core prescribes no coordinates whose axes turn.
     """
     if node.joint.type != "planar":
+        row = ConstraintRow(owner, "coordinate", node.inner, node.outer, np.zeros(3), np.zeros(3), sign=sign)
         at = zip(columns.tolist(), targets, strict=True)
-        return [coordinate_row(owner, node, target, k, sign) for k, target in at]
+        return [replace(row, coordinate=k, target=target) for k, target in at]
     x, y, z = np.eye(3)
     measures: tuple[tuple[ConstraintKind, Array, Array], ...] = (("slide", x, x), ("slide", y, y), ("turn", z, x))
     return [

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, Booleans, Integers, as_floats
+from ...common.arrays import Array, Booleans, Integers
 from .. import _core
 from .body import Body, BodyPoint, transformed
 from .kinematics import CutPlace, ModelParts
@@ -79,13 +79,13 @@ def vanishing_in_plane(body: Body) -> tuple[str, ...]:
 def _about(center: Array, S: Array, I: Array) -> Array:  # noqa: E741
     """∫ρ x_k u_l dV (3, 3, …) that keep shapes about the center, of S = ∫ρ u_l dV (3, …) and those of all fields."""
     moved = np.multiply.outer(center, S)
-    return as_floats(moved + _keeping_shapes(I - moved))
+    return moved + _keeping_shapes(I - moved)
 
 
 def _keeping_shapes(I: Array) -> Array:  # noqa: E741
     """Of tensors (3, 3, …) the part in the plane that stretch and turn have."""
     stretch, turn = 0.5 * (I[0, 0] + I[1, 1]), 0.5 * (I[0, 1] - I[1, 0])
-    return as_floats(np.multiply.outer(PLANE, stretch) + np.multiply.outer(TURN, turn))
+    return np.multiply.outer(PLANE, stretch) + np.multiply.outer(TURN, turn)
 
 
 EXACT = 1e-12  # of unit vectors, and of shapes relative to the largest: what round-off leaves of axes that are the same
@@ -162,7 +162,7 @@ def planar_data(data: _core.SpatialData, axes: Array) -> _core.PlanarData:
         planar.h, planar.j = I_bar[0, 1] - I_bar[1, 0], I_bar[0, 0] + I_bar[1, 1]
         planar.S_tilde, planar.m_xy = S[0, 1] - S[1, 0], S[0, 0] + S[1, 1]
         if data.K_s:
-            K_s = as_floats(np.einsum("kl,lmn->kmn", axes, np.array(data.K_s)))
+            K_s = np.einsum("kl,lmn->kmn", axes, np.array(data.K_s))
             K_x = _turned(np.array(data.K_x).reshape(3, 3, n, n), axes)
             if not (_is_small(K_s[2], K_s) and _is_small(K_x[:, 2], K_x)):
                 raise AcrossError
@@ -191,7 +191,7 @@ def _check_shapes(N: Array, F: Array) -> None:
 
 
 def _turned(tensor: Array, axes: Array) -> Array:
-    return as_floats(np.einsum("ik,jl,kl...->ij...", axes, axes, tensor))
+    return np.einsum("ik,jl,kl...->ij...", axes, axes, tensor)
 
 
 PLANAR = {
@@ -344,7 +344,7 @@ class _Reduction:
     def _direction(self, row: _core.ConstraintModel) -> Array:
         """Its f in axes of the plane, or of its planar marker a."""
         axes = self._ground if row.kind == _core.ConstraintKind.point else self._of_marker(row.a)
-        return as_floats(axes @ row.f)
+        return axes @ row.f
 
     def _body(self, number: int) -> _core.PlanarBody:
         body, axes = self._parts.bodies[number], self._axes[number]

@@ -65,7 +65,7 @@ class MultibodySystem:
             if load.joint in tree.carried
             for direction, moment in zip(model.along(load.joint), load.moments, strict=True)
         ]
-        self._along = [*moments, *model.modal_loads, *drives.along]
+        self._along = [*moments, *model.modal_loads]
         driven = self._driven((*commands, *(drives.replayed.commands if drives.replayed else ())))
         bodies, ground = self._markers.bodies(driven), self._markers.standing()
         wrenches = [_core.MarkerAt(*at) for at in self._wrenches]

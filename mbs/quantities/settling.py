@@ -19,7 +19,7 @@ from ...common.libraries import scipy
 from ...common.structs import struct
 from .._core import TimeFunction
 from ..linear.statics import Statics
-from ..linear.vibration import without_rows
+from ..model.known_motion import mass_matrices
 from ..model.model import Model
 from ..run.record import Run
 from ..scene.analysis import TimedAnalysis
@@ -92,14 +92,12 @@ def _lowest_frequency(model: Model, q: Array, t: float) -> float:
     0 where rows leave the robot free to move, or the equilibrium is unstable.
     """
     statics, tree = Statics(model, t), model.tree
-    at, still = statics.balance(q, np.arange(tree.n_v)), np.zeros(tree.n_v)
+    at = statics.balance(q, np.arange(tree.n_v))
     free = null_space(at.gradient, DEPENDENT)
     if not free.shape[1]:
         return float("nan")
-    without = without_rows(model)
-    mobility = without.core.derivatives(without.scene, t, q, still, still).a_f
     ways = statics.sizes[:, None] * free
-    K, M = free.T @ statics.stiffness(q, at) @ free, ways.T @ np.linalg.inv(mobility) @ ways
+    K, M = free.T @ statics.stiffness(q, at) @ free, ways.T @ mass_matrices(model, q[None], t)[0] @ ways
     K, M, own = (K + K.T) / 2, (M + M.T) / 2, np.abs(K.diagonal())
     scale = 1.0 / np.sqrt(np.maximum(own, FLOOR * max(own.max(), np.finfo(float).tiny)))
     if np.linalg.eigvalsh(scale[:, None] * K * scale)[0] < FREE:

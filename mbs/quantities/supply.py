@@ -81,7 +81,7 @@ def behind_gears(run: Run) -> Run:
     if not gears:
         return run
     model = with_compliance(run.model)
-    q, v, a = with_motors(model, (run.q, run.v, run.a), gears)
+    q, v, a = with_motors(model, run, gears)
     return replace(run, model=model, q=q, v=v, a=a)
 
 

@@ -8,7 +8,7 @@ them. With the rigid rotor's angle ψ = N γ + α_a a gear transmits τ_s = τ �
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import count
 from typing import TYPE_CHECKING, NamedTuple
@@ -74,7 +74,7 @@ def supplied_through_gears(run: Run) -> Supplied:
         where = f'{model.scene.path}: joint "{joint}"'
         spring = GearSpring(gear.spring, gear.damping, inertia * N**2, where)
         known.append((joint, spring, N * torques[:, model.tree.index[gear.joint.body.name]], _along(gear.joint, run)))
-    rigid = required_forces(compliant, _in_motor_coordinates(compliant, run, None), time)
+    rigid = required_forces(compliant, with_motors(compliant, run, {}), time)
     is_found, change = bool(twists) and all(of.torque is not None for of in twists.values()), np.inf
     for passes in count(1):
         forces = motor_forces(model, run.q, wanted + felt)
@@ -84,7 +84,7 @@ def supplied_through_gears(run: Run) -> Supplied:
         }
         if is_found:
             break
-        needed = required_forces(compliant, _in_motor_coordinates(compliant, run, gears), time) - rigid
+        needed = required_forces(compliant, with_motors(compliant, run, gears), time) - rigid
         before, felt = felt, needed[:, : felt.shape[1]]
         for gear in elastic:  # but for what their springs do along their own joints
             of = gears[gear.joint.joint.name].twist
@@ -102,14 +102,6 @@ def _along(node: Node, state: States) -> Array:
     of_joint = ((state.q, node.q), (state.v, node.v), (state.a, node.v))
     columns = np.column_stack([values[:, part.start] for values, part in of_joint])
     return -columns if node.backwards else columns
-
-
-def _in_motor_coordinates(compliant: Model, state: States, gears: Mapping[str, GearMotion] | None) -> KnownStates:
-    """The motion of links with motors as far ahead as `gears` say, or not at all."""
-    if gears is not None:
-        return KnownStates(*with_motors(compliant, (state.q, state.v, state.a), gears))
-    motors = np.array([_along(gear.joint, state) for gear in compliant.tree.gears]).transpose(2, 1, 0)
-    return KnownStates(*(np.hstack(pair) for pair in zip((state.q, state.v, state.a), motors, strict=True)))
 
 
 class MotorCoordinates(NamedTuple):
@@ -143,15 +135,18 @@ def with_motor_coordinates(run: Run, model: Model) -> MotorCoordinates:
             '"frame"',
         )
     forces, gears = supplied_through_gears(run)
-    q, v, a = with_motors(model, (run.q, run.v, run.a), gears)
-    return MotorCoordinates(q, v, a, gears, forces.moments)
+    return MotorCoordinates(*with_motors(model, run, gears), gears, forces.moments)
 
 
-def with_motors(model: Model, rigid: Sequence[Array], gears: Mapping[str, GearMotion]) -> list[Array]:
-    """Return q, v, a (T, …) of `model`, which has compliant gears, from those with `rigid` ones and `gears`."""
-    known = [gears[gear.joint.joint.name] for gear in model.tree.gears]
-    more = (np.column_stack([getattr(of, order) for of in known]) for order in ("angle", "rate", "acceleration"))
-    return [np.hstack(pair) for pair in zip(rigid, more, strict=True)]
+def with_motors(model: Model, rigid: States, gears: Mapping[str, GearMotion]) -> KnownStates:
+    """Return states of `model`, which has compliant gears, from those with rigid ones and the twists of `gears`.
+
+    Without any `gears` motors are as far as their joints.
+    """
+    known = [(gear.joint, gears.get(gear.joint.joint.name)) for gear in model.tree.gears]
+    motors = np.array([_along(node, rigid) + (0.0 if of is None else of.twist) for node, of in known])
+    parts = zip((rigid.q, rigid.v, rigid.a), motors.transpose(2, 1, 0), strict=True)
+    return KnownStates(*(np.hstack(pair) for pair in parts))
 
 
 DEGREE = 5

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, Booleans, as_floats
+from ...common.arrays import Array, Booleans
 from .._core import TimeFunction
 from ..posture.posture import misfits
 from ..scene.analysis import TimedAnalysis
@@ -177,7 +177,7 @@ def _resolved(target: TimeFunction, times: Array, share: float = ENDS.resolved) 
         rough &= np.diff(times) > ENDS.shortest * (times[-1] - times[0])
         if not rough.any() or len(times) + np.count_nonzero(rough) > ENDS.most:
             break
-        times = np.sort(np.concatenate([times, as_floats(0.5 * (times[:-1] + times[1:])[rough])]))
+        times = np.sort(np.append(times, 0.5 * (times[:-1] + times[1:])[rough]))
     return times
 
 

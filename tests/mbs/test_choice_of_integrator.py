@@ -12,7 +12,7 @@ from scipy.linalg import eigh, null_space
 
 import ffrobot
 from ffrobot.mbs.inversion.motors_only import MotorsOnly
-from ffrobot.mbs.linear.vibration import vibrations_of, without_rows
+from ffrobot.mbs.linear.vibration import vibrations_of
 from ffrobot.mbs.posture.start import undeformed_posture
 from ffrobot.mbs.quantities.motion import constraint_rows
 
@@ -29,7 +29,7 @@ def test_vibrations_solve_the_linearised_equations():
     """Frequencies by the oracle's mass matrix, and by what the constraints leave free."""
     robot = arm()
     q = undeformed_posture(robot.model).q
-    modes = vibrations_of(robot.model, without_rows(robot.model), 0.0, q)
+    modes = vibrations_of(robot.model, 0.0, q)
     motion = evaluated(robot, 0.0, q, 0 * q).motion
     mechanism, K = mechanism_of(robot.model.tree, np.zeros(3)), np.zeros((len(q), len(q)))
     (state,) = absolute_states(mechanism, accelerated(motion))
@@ -47,7 +47,7 @@ def test_vibrations_show_in_the_motion():
     path = {"name": "tip", "point": "link2.tip", "x": "1.2", "y": "1.4"}
     robot = arm(gravity=(0.0, 0.0), trajectory=[path])
     rest = undeformed_posture(robot.model)
-    modes = vibrations_of(robot.model, without_rows(robot.model), 0.0, rest.q)
+    modes = vibrations_of(robot.model, 0.0, rest.q)
     away = 1e-7 * modes.shape[:, 0]
     a = evaluated(robot, 0.0, rest.q + away, rest.v).outcome.a[0]
     np.testing.assert_allclose(a, -(modes.frequency[0] ** 2) * away, atol=1e-3 * np.abs(a).max())

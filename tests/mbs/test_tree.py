@@ -14,7 +14,7 @@ from trees_in_a_plane import planar_model
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.fields.orientations import OrientationLaw
-from ffrobot.mbs.model.nodes import ConstraintRow, Section, coordinate_row
+from ffrobot.mbs.model.nodes import ConstraintRow, Section, rows_of_joint
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.posture.posture import mobilities
 
@@ -101,7 +101,7 @@ def every_row(rng, model):
         yield from (ConstraintRow("path", "rotation", GROUND, b, e, e, law=laws[0]) for e in axes)
         yield from (ConstraintRow("path", "dot", b, GROUND, e, axes[2], law=laws[1]) for e in axes[:2])
         if node.joint.units and node.joint.type != "planar":
-            yield coordinate_row("path", node, moving[5], sign=-1.0)
+            yield from rows_of_joint("path", node, np.r_[node.v][:1], moving[5:6], -1.0)
             if node.joint.units[0] == "rad":
                 yield ConstraintRow("loop", "turn", a, b, axes[2], axes[0], coordinate=node.v.start)
 

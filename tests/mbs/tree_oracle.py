@@ -164,9 +164,10 @@ def _by_modes(body, section, p):
     if not section.point or not body.n_modes:
         none = np.zeros((3, body.n_modes))
         return none, none
-    at = bent_section(body, section.point, p)
-    phi = section.turned(at.phi[..., None])[..., 0]
-    return at.u_p, left_jacobian(phi) @ section.turned(at.phi_p)
+    at, phi = body.points[section.point], bent_section(body, section.point, p).phi
+    K = np.zeros((6, body.n_modes, body.n_modes)) if body.stiffening is None else body.stiffening.at(section.point)
+    u_p, phi_p = np.split(np.vstack([at.translation, at.rotation]) - np.einsum("kmn,...n->...km", K, p), 2, axis=-2)
+    return u_p, left_jacobian(section.turned(phi[..., None])[..., 0]) @ section.turned(phi_p)
 
 
 def _place_in_q(tree, coordinate):
