@@ -85,7 +85,7 @@ def is_own_fault(error: BaseException) -> bool:
 
 @contextmanager
 def blaming_file(problem: Callable[[Exception], str]) -> Iterator[None]:
-    """Context that turns a reader's exceptions into `InputError` with the text `problem`(error).
+    """Context that turns a reader's exceptions into `InputError` with the text `problem`(error), unless that is empty.
 
     Faults of the program stay what they are.
     """
@@ -94,9 +94,9 @@ def blaming_file(problem: Callable[[Exception], str]) -> Iterator[None]:
     except FfrobotError:
         raise
     except Exception as error:
-        if is_own_fault(error):
+        if is_own_fault(error) or not (text := problem(error)):
             raise
-        raise InputError(problem(error)) from error
+        raise InputError(text) from error
 
 
 def refuse(lines: Iterable[str], where: object = "") -> None:

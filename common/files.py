@@ -74,9 +74,7 @@ def check_output(path: Path, file_format: str) -> None:
     An existing file is replaced only where it is no input, and is empty, an HDF5 file whose attribute `format` is
     `file_format`, or one too damaged to tell. Raises `InputError`.
     """
-    check_not_an_input(path)
-    if path.is_dir():
-        raise InputError(f"{path}: output: expected a file name", "a folder")
+    _check_no_folder(path, "output")
     if not path.parent.is_dir():
         raise InputError(f"{path}: output: expected a file in a folder that exists", f"no folder {path.parent}")
     replaceable = ("empty", "unreadable", f"HDF5 {file_format}", DAMAGED)
@@ -92,11 +90,15 @@ def check_output(path: Path, file_format: str) -> None:
         raise InputError(f"{path}: output: expected a writable folder, found: {error.strerror or error}") from None
 
 
-def check_ending(path: Path, label: str, endings: Sequence[str]) -> None:
-    """Refuse an output that is a folder or an input, or whose name has none of the `endings`. Raises `InputError`."""
+def _check_no_folder(path: Path, label: str) -> None:
     check_not_an_input(path)
     if path.is_dir():
         raise InputError(f"{path}: {label}: expected a file name", "a folder")
+
+
+def check_ending(path: Path, label: str, endings: Sequence[str]) -> None:
+    """Refuse an output that is a folder or an input, or whose name has none of the `endings`. Raises `InputError`."""
+    _check_no_folder(path, label)
     if path.suffix.lower() not in endings:
         raise InputError(f"{path}: {label}: expected a name that ends in {either(endings)}", f'"{path.name}"')
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ import numpy as np
 
 from . import checksum
 from .arrays import NDArray
-from .errors import FfrobotError, InputError, is_own_fault
+from .errors import InputError, blaming_file
 from .outputs import check_regular, protected
 
 if TYPE_CHECKING:
@@ -99,23 +99,17 @@ def fields_in(values: Mapping[str, Any], record: type[DataclassInstance]) -> dic
     return {name: values[name] for name, is_needed in needed.items() if is_needed or name in values}
 
 
-@contextmanager
-def blaming(*paths: Path) -> Iterator[None]:
+def blaming(*paths: Path) -> AbstractContextManager[None]:
     """Context that turns read errors of HDF5 files into `InputError`, as of files not written by ffrobot.
 
     With all of them sound an error is the program's own, and is left as it is, as are errors that no file raises.
     """
-    try:
-        yield
-    except FfrobotError:
-        raise
-    except Exception as error:
+
+    def problem(error: Exception) -> str:
         doubtful = [path for path in paths if _is_doubtful(path)]
-        if not doubtful or is_own_fault(error):
-            raise
-        raise InputError(
-            f"{doubtful[0]}: damaged file, or one that ffrobot did not write: {_in_words(error)}"
-        ) from error
+        return f"{doubtful[0]}: damaged file, or one that ffrobot did not write: {_in_words(error)}" if doubtful else ""
+
+    return blaming_file(problem)
 
 
 @contextmanager

@@ -35,12 +35,8 @@ def check_name(value: str) -> str:
     return check_title(value)
 
 
-def _check_path(value: str) -> str:
-    return check_title(value, LONGEST_PATH)
-
-
 Title = Annotated[str, AfterValidator(check_title)]
-PathName = Annotated[str, AfterValidator(_check_path)]
+PathName = Annotated[str, AfterValidator(lambda value: check_title(value, LONGEST_PATH))]
 Name = Annotated[str, AfterValidator(check_name)]
 
 MOST_OUTPUTS = 10_000_000  # of an analysis; samples of a closed loop likewise

@@ -36,13 +36,7 @@ def protected(paths: Iterable[Path]) -> Iterator[None]:
 
 def check_not_an_input(path: Path) -> None:
     """Raise `InputError` where `path` is, or leads to, one of the `protected` files, or to nowhere in a circle."""
-    try:
-        target = path.resolve()
-        with suppress(FileNotFoundError):
-            if path.is_symlink():
-                os.stat(path)
-    except (OSError, RuntimeError, ValueError) as error:
-        raise InputError(f"{shown(str(path))}: output: expected a file name", why_no_file(error)) from None
+    target = _target(path, "output: expected a file name")
     for source in _inputs.get():
         same = target == source.absolute() or target == _resolved(source)
         with suppress(OSError, ValueError):
@@ -54,14 +48,23 @@ def check_not_an_input(path: Path) -> None:
 def check_file_name(text: str) -> Path:
     """`text` as a path. Raises `InputError` unless it can be the name of a regular file."""
     path = Path(text)
-    try:
-        path.resolve()
-        with suppress(FileNotFoundError, NotADirectoryError):
-            os.stat(path)  # `exists` and, from Python 3.13 on, `resolve` are silent about circles
-    except (OSError, RuntimeError, ValueError) as error:
-        raise InputError(f"{shown(text)}: expected the name of a file", why_no_file(error)) from None
+    _target(path, "expected the name of a file")
     check_regular(path)
     return path
+
+
+def _target(path: Path, expected: str) -> Path:
+    """Where `path` leads. Raises `InputError` with what was `expected` where that is in a circle, or it is no name."""
+    try:
+        with suppress(FileNotFoundError, NotADirectoryError):
+            os.stat(path)  # `exists` and, from Python 3.13 on, `resolve` are silent about circles
+        return path.resolve()
+    except (OSError, RuntimeError, ValueError) as error:
+        about = getattr(error, "strerror", None) or str(error)
+        is_circle = "loop" in about.lower() or "symbolic" in about
+        raise InputError(
+            f"{shown(str(path))}: {expected}", "links that lead in a circle" if is_circle else about
+        ) from None
 
 
 def check_regular(path: Path) -> None:
@@ -74,12 +77,6 @@ def check_regular(path: Path) -> None:
         if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
             kind = next((word for is_kind, word in _SPECIAL.items() if is_kind(mode)), "a device")
             raise InputError(f"{path}: expected a regular file", kind)
-
-
-def why_no_file(error: Exception) -> str:
-    """Why a path cannot be used, from the `error`: too long, circular links, no file name."""
-    about = getattr(error, "strerror", None) or str(error)
-    return "links that lead in a circle" if "loop" in about.lower() or "symbolic" in about else about
 
 
 def check_same_kind(path: Path, content: bytes) -> None:
