@@ -11,8 +11,16 @@ from ..mbs.model.divided_link import DividedLink, LinkInPieces, PieceOfLink, div
 from ..mbs.model.model import Model
 from ..mbs.quantities.attachment_error import missed_by_pieces
 from ..mbs.quantities.motion import modal_coordinates
-from ..mbs.quantities.second_order import IN_MOTION, Missing, largest_displacement
-from ..mbs.quantities.validity import ENOUGH, Bending, enough_pieces, link_bending, shape_from_chord
+from ..mbs.quantities.validity import (
+    ENOUGH,
+    IN_MOTION,
+    Bending,
+    Missing,
+    enough_pieces,
+    largest_displacement,
+    link_bending,
+    shape_from_chord,
+)
 from ..mbs.run.context import WholeLinks
 from ..mbs.run.record import Run
 from ..scene.pieces import bodies_in_pieces, places_on_pieces

@@ -9,8 +9,8 @@ from steel_arms import two_links
 
 import ffrobot as library
 from ffrobot.mbs.quantities.attachment_error import Start, mode_error, start_errors
-from ffrobot.mbs.quantities.second_order import ModalLoads, lasting, stiffness_change
 from ffrobot.mbs.quantities.supply import motor_moments
+from ffrobot.mbs.quantities.validity import ModalLoads, lasting, stiffness_change
 from ffrobot.run.solve import solve_scene
 from ffrobot.run.watcher import Watcher
 
