@@ -32,18 +32,13 @@ class OrientationLaw:
 
     @cached_property
     def in_core(self) -> _core.TurningLaw:
-        """Return the law as a record of the core, which evaluates it at any time."""
+        """Return the law as a record of the core, which evaluates it at any time, with ω (rad/s) and α (rad/s²)."""
         kind, reference = getattr(_core.OrientationKind, self.kind), exponential(np.array(self.reference))
         return _core.TurningLaw(kind, list(self.functions), reference)
 
     def sample(self, times: Array) -> Array:
         """Return triads A (T, 3, 3), axes in columns, at `times` (T,), s; of a direction by z's smallest turn."""
         return self.in_core.sample(times)[0].reshape(-1, 3, 3)
-
-    def rates(self, times: Array) -> tuple[Array, Array]:
-        """Return ω (rad/s) and α (rad/s²), (T, 3), in global axes; of a direction without spin about it."""
-        _, omega, alpha = self.in_core.sample(times)
-        return omega, alpha
 
 
 def orientation_of(table: Waypoints) -> tuple[Waypoints, Reference]:

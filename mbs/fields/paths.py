@@ -71,11 +71,14 @@ class Piecewise:
             values = values * (t - self.breaks[piece])[:, None] + perm(power, derivative) * self.coefficients[piece, k]
         return values if derivative == 0 else np.where((t == times)[:, None], values, 0.0)
 
+    def polynomials(self) -> list[TimeFunction]:
+        """One function of time for each component, without values before and after the motion."""
+        each = np.ascontiguousarray(np.moveaxis(self.coefficients, 2, 0))
+        return [TimeFunction.polynomial(self.breaks, one) for one in each]
+
     def functions(self) -> list[TimeFunction]:
-        """One function of time for each component, held before and after the motion."""
-        each = np.moveaxis(self.coefficients, 2, 0)
-        made = (TimeFunction.polynomial(self.breaks, np.ascontiguousarray(one)) for one in each)
-        return [function.held(self.begin, self.end) for function in made]
+        """The same, held before and after the motion."""
+        return [function.held(self.begin, self.end) for function in self.polynomials()]
 
 
 def shifted(coefficients: Array, s: Array | float) -> Array:
@@ -120,18 +123,12 @@ SHORTEST = 1e-9  # of a motion's duration: what is shorter would be lost by roun
 HALF = 0.5  # of each time of averaging to the one before, where no limit says otherwise
 
 
-@struct
-class PathLimits:
+class PathLimits(NamedTuple):
     """Limits of speed, acceleration and jerk along a path segment, m/s or rad/s and so on; infinite if none."""
 
     speed: float = inf
     acceleration: float = inf
     jerk: float = inf
-
-    @property
-    def by_order(self) -> tuple[float, float, float]:
-        """Limits of the first, second and third derivative."""
-        return self.speed, self.acceleration, self.jerk
 
 
 def law_in(duration: float, profile: Profile, smoothness: int) -> Piecewise:
@@ -149,9 +146,7 @@ def law_within(distance: float, limits: PathLimits, profile: Profile, smoothness
     """
     if profile == "rest-to-rest":
         peaks = [distance * law_peak(smoothness, order) for order in (1, 2, 3)]
-        times = [
-            (peak / limit) ** (1 / k) for k, (peak, limit) in enumerate(zip(peaks, limits.by_order, strict=True), 1)
-        ]
+        times = [(peak / limit) ** (1 / k) for k, (peak, limit) in enumerate(zip(peaks, limits, strict=True), 1)]
         return law_in(max(times), profile, smoothness)
     averaged = [T for T in averaging_times(distance, limits) if T > 0.0]
     while len(averaged) < smoothness + 1:
@@ -171,7 +166,7 @@ def check_durations(durations: Sequence[float], total: float) -> None:
 
 def averaging_times(distance: float, limits: PathLimits) -> tuple[float, float, float]:
     """T₁ ≥ T₂ + T₃, T₂ ≥ T₃ (s) of the fastest motion over `distance` within the limits; T₃ = 0 without one of jerk."""
-    h, (v, a, j) = distance, limits.by_order
+    h, (v, a, j) = distance, limits
     T_3 = min(a / j, sqrt(v / j), (h / (2 * j)) ** (1 / 3)) if j < inf else 0.0
     if T_3:
         a = j * T_3  # what is reached
@@ -252,7 +247,7 @@ def path_of(legs: Legs) -> Piecewise:
         return motion
     excess = max(
         (_peak(motion, order) / (limit / legs.stretch**order)) ** (1 / order)
-        for order, limit in enumerate(legs.limits.by_order, 1)
+        for order, limit in enumerate(legs.limits, 1)
     )
     return _joined(replace(legs, stretch=legs.stretch * excess)) if excess > 1.0 else motion
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ...common.arrays import Array, Booleans, Indices
-from ...common.errors import InputError, quoted
+from ...common.errors import InputError, naming, quoted
 from ...common.libraries import scipy
 from ...common.tables import LARGEST, shown
 from ...common.toml_files import read_csv
@@ -133,9 +133,26 @@ class Recorded:
     rates: Array | None = None
 
     def waypoints(self) -> Waypoints:
-        """Return the rows as waypoints. Raises `InputError` as `waypoints_of`."""
-        read = waypoints_of(self.columns, self.times, self.values, self.place)
-        return replace(read, remarks=(*self.remarks, *read.remarks))
+        """Return the rows as waypoints, those that repeat the one before once, with remarks on what is odd.
+
+        Raises `InputError` for times that do not increase, and fewer than two rows.
+        """
+        times, values, remarks = self.times, self.values, [*self.remarks]
+        rows, again = np.arange(len(times)), np.zeros(len(times), dtype=bool)
+        again[1:] = (np.diff(times) == 0) & (np.diff(values, axis=0) == 0).all(axis=1)
+        if again.any():
+            place = self.place(int(again.argmax()))
+            remarks.append(f"{place}: {again.sum()} rows that repeat the one before count once")
+        times, values, rows = times[~again], values[~again], rows[~again]
+        late = np.flatnonzero(np.diff(times) <= 0.0)
+        if late.size:
+            before, after = times[late[0]], times[late[0] + 1]
+            place = self.place(int(rows[late[0] + 1]))
+            raise InputError(f"{place}: expected times that increase", f"t = {after:g} after {before:g}")
+        if len(times) < 2:
+            raise InputError("expected at least 2 waypoints", len(times))
+        remarks += [*_jumps(self.columns, times, values), *_gaps(times, np.any(np.diff(values, axis=0), axis=1))]
+        return Waypoints(tuple(self.columns), times, values, (*remarks, *_moving_ends(times, values)))
 
 
 def column_of(columns: Sequence[str], joint: str) -> int | None:
@@ -157,10 +174,8 @@ def load_waypoints(path: Path) -> Waypoints:
     Raises `InputError` naming file and line.
     """
     record = load_record(path)
-    try:
+    with naming(path):
         waypoints = record.waypoints()
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
     return replace(waypoints, remarks=tuple(f"{path.name}: {remark}" for remark in waypoints.remarks))
 
 
@@ -184,28 +199,6 @@ def load_record(path: Path) -> Recorded:
             if factor != 1.0:
                 remarks.append(f'"{shown(name)}" is converted to {"m" if "m" in (unit[2] or unit[3]) else "rad"}')
     return Recorded(names, times, values, lambda k: f"line {lines[k]}", tuple(remarks))
-
-
-def waypoints_of(columns: Sequence[str], times: Array, values: Array, place: Callable[[int], str]) -> Waypoints:
-    """A table of `values` (T, columns) at `times` (T,), s; rows that repeat the one before count once.
-
-    `place` of a row is where messages say that it is. Remarks are on what is odd. Raises `InputError` for times that do
-    not increase, and fewer than two rows.
-    """
-    remarks, rows, again = list[str](), np.arange(len(times)), np.zeros(len(times), dtype=bool)
-    again[1:] = (np.diff(times) == 0) & (np.diff(values, axis=0) == 0).all(axis=1)
-    if again.any():
-        remarks.append(f"{place(int(again.argmax()))}: {again.sum()} rows that repeat the one before count once")
-    times, values, rows = times[~again], values[~again], rows[~again]
-    late = np.flatnonzero(np.diff(times) <= 0.0)
-    if late.size:
-        before, after = times[late[0]], times[late[0] + 1]
-        where = place(int(rows[late[0] + 1]))
-        raise InputError(f"{where}: expected times that increase", f"t = {after:g} after {before:g}")
-    if len(times) < 2:
-        raise InputError("expected at least 2 waypoints", len(times))
-    remarks += [*_jumps(columns, times, values), *_gaps(times, np.any(np.diff(values, axis=0), axis=1))]
-    return Waypoints(tuple(columns), times, values, (*remarks, *_moving_ends(times, values)))
 
 
 def _seconds(header: str, times: Array) -> tuple[Array, list[str]]:
@@ -335,8 +328,7 @@ def interpolated(nodes: Array, values: Array, degree: int = 5, at_rest: bool = T
     With `at_rest` its first two derivatives vanish at both ends.
     """
     if degree == 1:
-        rates = np.diff(values, axis=0) / np.diff(nodes)[:, None]
-        return Piecewise(nodes, np.stack([rates, values[:-1]], axis=1))
+        return Piecewise(nodes, np.stack([difference_quotients(nodes, values)[1], values[:-1]], axis=1))
     # Loaded here: a scene without waypoints does not pay for it.
     rest = [(m, np.zeros(values.shape[1])) for m in (1, 2)]
     curve = scipy.interpolate.make_interp_spline(nodes, values, k=degree, bc_type=(rest, rest) if at_rest else None)
@@ -349,6 +341,4 @@ def spline(nodes: Array, values: Array, degree: int = 5, at_rest: bool = False) 
     """Functions of time by columns of `values` (N, columns) at `nodes` (N,), s, `interpolated`; constants if N is 1."""
     if len(nodes) == 1:
         return [TimeFunction.constant(value) for value in values[0]]
-    curve = interpolated(nodes, values, degree, at_rest)
-    each = np.ascontiguousarray(np.moveaxis(curve.coefficients, 2, 0))  # (n, intervals, powers)
-    return [TimeFunction.polynomial(curve.breaks, of_one) for of_one in each]
+    return interpolated(nodes, values, degree, at_rest).polynomials()

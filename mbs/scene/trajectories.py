@@ -147,14 +147,17 @@ class MotionKeys(Referring):
                 raise ValueError(f'expected {count} numbers in "{key}", found {len(value)}')
         if self.fastest and "stretch" in self.model_fields_set:
             raise ValueError('expected one of the keys "fastest" and "stretch", found both')
-        limits = [key for key in LIMITS if getattr(self, key) is not None]
-        if bool(limits) == (self.duration is not None):
-            given = "both" if limits else "neither"
+        if bool(self._limits) == (self.duration is not None):
+            given = "both" if self._limits else "neither"
             raise ValueError(f'expected either limits ({quoted(LIMITS)}) or a "duration" with "via", found {given}')
-        if self.profile in ("s-curve", "trapezoid") and limits == ["speed"]:
+        if self.profile in ("s-curve", "trapezoid") and self._limits == ["speed"]:
             raise ValueError(f'expected "acceleration" or "jerk" with profile = "{self.profile}", found only "speed"')
         if self.profile == "trapezoid" and self.jerk is not None:
             raise ValueError('expected no "jerk" with profile = "trapezoid" (its acceleration jumps), found it')
+
+    @property
+    def _limits(self) -> list[str]:
+        return [key for key in LIMITS if getattr(self, key) is not None]
 
     def along_table(self, waypoints: Waypoints) -> Piecewise:
         """The motion of all columns of a table."""
@@ -246,10 +249,11 @@ class Trajectory(MotionKeys):
         allowed = keys_here(self, (*PLACES, *ORIENTATIONS), info) if subject == "point" else ("value",)
         tables = ("waypoints", "via")
         given = only(self, subject, (*allowed, *tables), (*PLACES, *ORIENTATIONS, "value", *tables))
-        if self.waypoints is not None:
-            self._check_columns(given, allowed)
-        if self.via is not None and set(given) & {*PLACES, "value"}:
+        table = next((key for key in tables if key in given), None)
+        if table is not None and set(given) - {table, *(() if table == "waypoints" else ORIENTATIONS)}:
             raise ValueError(f"expected either waypoints, via or expressions, found {quoted(given)}")
+        if self.waypoints is not None:
+            self._check_columns(self.waypoints, allowed)
         of_point = {2: OF_POINT[2]} if is_planar(info) else OF_POINT
         self.check_motion(of_point if subject == "point" else {1: "numbers"}, self.waypoints)
         self._check_orientation()
@@ -259,11 +263,8 @@ class Trajectory(MotionKeys):
             raise ValueError("expected limits and times that fit each other in size, found infinite derivatives")
         return self
 
-    def _check_columns(self, given: list[str], allowed: tuple[str, ...]) -> None:
-        assert self.waypoints is not None
-        if given != ["waypoints"]:
-            raise ValueError(f"expected either waypoints, via or expressions, found {quoted(given)}")
-        columns = self.waypoints.columns
+    def _check_columns(self, waypoints: Waypoints, allowed: tuple[str, ...]) -> None:
+        columns = waypoints.columns
         places = tuple(key for key in allowed if key not in ORIENTATIONS)
         wanted = (*places, *QUATERNION) if "z" in allowed else places
         turned = set(columns) & set(QUATERNION)
@@ -275,10 +276,7 @@ class Trajectory(MotionKeys):
             expected = ",".join(("t", *columns))
             raise ValueError(f'expected waypoints with the header {header}, found "{expected}"{missing}')
         if turned:
-            try:
-                orientation_of(self.waypoints)
-            except InputError as error:
-                raise ValueError(f"waypoints: {error}") from None
+            self._check_turns("waypoints")
 
     def _check_orientation(self) -> None:
         keys = [key for key in ORIENTATIONS if getattr(self, key) is not None]
@@ -295,15 +293,17 @@ class Trajectory(MotionKeys):
         if keys:
             raise ValueError(f"expected an orientation either in via or by {quoted(keys)}, found both")
         if self.duration is None:
-            limits = [key for key in LIMITS if getattr(self, key) is not None]
             raise ValueError(
                 f'expected a "duration" with poses in via (limits in m/s say nothing of turning), found'
-                f" {quoted(limits)}"
+                f" {quoted(self._limits)}"
             )
+        self._check_turns("via")
+
+    def _check_turns(self, key: str) -> None:
         try:
             self._turns  # noqa: B018 (looked at for what it raises)
         except InputError as error:
-            raise ValueError(f"via: {error}") from None
+            raise ValueError(f"{key}: {error}") from None
 
     def changed(self, **keys: object) -> Self:
         """Return the trajectory with some keys replaced."""

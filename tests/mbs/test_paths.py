@@ -59,7 +59,7 @@ def _left(law, k, order):
 def test_limits_are_kept_and_one_is_reached(profile, smoothness, distance):
     limits = PathLimits(1.5, 6.0, inf if profile == "trapezoid" else 50.0)
     law = law_within(distance, limits, profile, smoothness).along(np.array([distance]))
-    ratios = [np.abs(law.sample(over(law, 20001), k)).max() / limit for k, limit in enumerate(limits.by_order, 1)]
+    ratios = [np.abs(law.sample(over(law, 20001), k)).max() / limit for k, limit in enumerate(limits, 1)]
     assert max(ratios) == pytest.approx(1.0, abs=1e-6)
 
 
@@ -109,7 +109,7 @@ def test_blended_corner_stays_within_its_triangle_and_the_limits():
     speed = np.linalg.norm(passing.sample(over(passing, 4001), 1), axis=1)
     assert speed[1300:2700].min() > 0.2  # no stop at the corner
     peaks = [np.linalg.norm(passing.sample(over(passing, 20001), k), axis=1).max() for k in (1, 2, 3)]
-    ratios = np.array(peaks) / limits.by_order
+    ratios = np.array(peaks) / limits
     assert ratios.max() == pytest.approx(1.0, abs=1e-3)  # found by sampling
 
 

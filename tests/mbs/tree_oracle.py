@@ -242,7 +242,7 @@ def target_rates(model, q, times):
         if row.target is not None:
             found[:, k] = row.target.sample(times)[1]
         elif row.law is not None:
-            omega = row.law.rates(times)[0]
+            omega = row.law.in_core.sample(times)[1]
             if row.kind == "rotation":
                 found[:, k] = omega @ row.f
             else:  # f·g with g turning by ω
