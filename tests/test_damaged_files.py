@@ -10,8 +10,13 @@ import pytest
 import ffrobot
 from ffrobot.common import checksum
 from ffrobot.common.errors import InputError
+from ffrobot.common.hdf5 import blaming, reading
 from ffrobot.fe_models.modal_body_file import read_modal_body
+from ffrobot.present.console import summary_console
+from ffrobot.present.feasibility import feasibility_tables
+from ffrobot.present.info import describe
 from ffrobot.results.file import Results
+from ffrobot.results.kinds import read_motors, read_unsupplied
 
 
 @pytest.fixture
@@ -71,44 +76,31 @@ def test_files_without_checksums_are_read(modal):
     np.testing.assert_array_equal(read_modal_body(modal).S_bar, expected.S_bar)
 
 
-def _replace(name, **keys):
-    def edit(file):
-        del file[name]
-        file.create_dataset(name, **keys)
-
-    return edit
-
-
-def _link(name, link):
-    def edit(file):
-        del file[name]
-        file[name] = link
-
-    return edit
-
-
-def _virtual(file):
-    layout = h5py.VirtualLayout(shape=(3, 3), dtype="f8")
-    layout[:] = h5py.VirtualSource("elsewhere.h5", "x", shape=(3, 3))
-    del file["second_moment"]
-    file.create_virtual_dataset("second_moment", layout)
+VIRTUAL = h5py.VirtualLayout(shape=(3, 3), dtype="f8")
+VIRTUAL[:] = h5py.VirtualSource("elsewhere.h5", "x", shape=(3, 3))
 
 
 @pytest.mark.parametrize(
-    ("edit", "named"),
+    ("name", "item", "named"),
     [
-        (_link("mass", h5py.ExternalLink("elsewhere.h5", "mass")), "found a link at mass"),
-        (_link("mass", h5py.SoftLink("/length")), "found a link at mass"),
-        (_virtual, "found a virtual or external dataset"),
-        (_replace("second_moment", shape=(3, 3), dtype="f8", external=[("elsewhere", 0, 72)]), "or external dataset"),
-        (_replace("mesh/points", shape=(10**7, 10**6), dtype="f8"), "expected 8e"),
-        (_replace("second_moment", data=-np.eye(3)), "second_moment, as inertia about the center of mass: expected no"),
-        (_replace("invariants/S_bar", data=np.full((3, 10), 9.0)), "modal_mass, less S_bar: expected no negative"),
+        ("mass", h5py.ExternalLink("elsewhere.h5", "mass"), "found a link at mass"),
+        ("mass", h5py.SoftLink("/length"), "found a link at mass"),
+        ("second_moment", VIRTUAL, "found a virtual or external dataset"),
+        ("second_moment", {"shape": (3, 3), "dtype": "f8", "external": [("elsewhere", 0, 72)]}, "or external dataset"),
+        ("mesh/points", {"shape": (10**7, 10**6), "dtype": "f8"}, "expected 8e"),
+        ("second_moment", -np.eye(3), "second_moment, as inertia about the center of mass: expected no"),
+        ("invariants/S_bar", np.full((3, 10), 9.0), "modal_mass, less S_bar: expected no negative"),
     ],
 )
-def test_doctored_modal_bodies(modal, edit, named):
+def test_doctored_modal_bodies(modal, name, item, named):
     with h5py.File(modal, "r+") as file:
-        edit(file)
+        del file[name]
+        if isinstance(item, dict):
+            file.create_dataset(name, **item)
+        elif item is VIRTUAL:
+            file.create_virtual_dataset(name, item)
+        else:
+            file[name] = item
     checksum.seal(modal)
     with pytest.raises(InputError, match=named):
         read_modal_body(modal)
@@ -177,12 +169,6 @@ OF_NIGHT = [pytest.param(command, marks=pytest.mark.nightly) for command in ("fe
 @pytest.mark.parametrize("command", ["info", "linear", "report", *OF_NIGHT])
 def test_results_that_lack_something(results, members, tmp_path, command):
     """Changed on purpose, sealed again: a message, or all is well."""
-    from ffrobot.common.hdf5 import reading
-    from ffrobot.pictures.report import write_report
-    from ffrobot.pictures.view import Options, view_file
-    from ffrobot.present.console import summary_console
-    from ffrobot.present.feasibility import feasibility_tables
-    from ffrobot.present.info import describe
 
     def linear(path):
         with Results(path) as opened:
@@ -193,8 +179,8 @@ def test_results_that_lack_something(results, members, tmp_path, command):
         "feasibility": lambda path: summary_console().print(feasibility_tables(path, None)),
         "linear": linear,
         "plot": lambda path: ffrobot.plot_results(path, tmp_path / "figures", ["svg"]),
-        "report": lambda path: write_report([path], tmp_path / "page.html"),
-        "view": lambda path: view_file(path, tmp_path / "view", Options(frames=2, pictures=False)),
+        "report": lambda path: ffrobot.write_report(path, tmp_path / "page.html"),
+        "view": lambda path: ffrobot.view_file(path, tmp_path / "view", pictures=False, frames=2),
     }[command]
     content, chance, refused = results.read_bytes(), random.Random(command), 0
     for member in chance.sample(members, 2 if command in ("plot", "report", "view") else 40):
@@ -215,10 +201,6 @@ def test_results_that_lack_something(results, members, tmp_path, command):
 @pytest.mark.parametrize("of", ["motor", "unsupplied", "layers"])
 def test_records_that_lack_a_field(tmp_path, of):
     """Each that is read from results: a message with what is missing, and no program fault."""
-    from ffrobot.common.hdf5 import blaming
-    from ffrobot.results.file import Results
-    from ffrobot.results.kinds import read_motors, read_unsupplied
-
     path, nothing = tmp_path / "r.h5", np.zeros((1, 1))
     with h5py.File(path, "w") as file:
         file.update({"joints/A": nothing, "unsupplied": nothing})

@@ -20,29 +20,26 @@ from ffrobot.present import console
 from ffrobot.run.watcher import Watcher
 
 LINK = beam_link(0.6, tube(0.02, 0.016), 10, name="arm", modes={"count": 3, "family": "in-plane-bending"})
+MOMENT = "inverse/joints/shoulder/moment"
 KEYS = {"time", "bodies/arm/angle", "points/arm.tip/position[0]", "joints/shoulder/moment", "energy/kinetic"}
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A folder with the link file of an arm and its modal body."""
+    """A folder with the modal body of an arm."""
     folder = tmp_path_factory.mktemp("arm")
-    (folder / "arm.toml").write_text(tomli_w.dumps(LINK), encoding="utf-8")
-    ffrobot.make_link(folder / "arm.toml")
+    ffrobot.make_link(LINK, folder / "arm.h5")
     return folder
 
 
 def swing(folder, **changes):
-    keys = {
-        "name": "swing",
-        "gravity": np.array([0.0, -9.81]),
-        "body": [{"name": "arm", "modal": folder / "arm.h5"}],
-        "joint": [{"name": "shoulder", "type": "revolute", "between": ("ground", "arm.root")}],
-        "initial": {"state": "static"},
-        "trajectory": [{"name": "turn", "joint": "shoulder", "value": "0.5*sin(t)"}],
-        "analysis": [{"name": "inverse", "kind": "pcid", "end": np.float64(0.02), "output_step": 0.001}],
-    }
-    return ffrobot.make_scene(folder=folder, **keys | changes)
+    keys = planar(
+        [{"name": "arm", "modal": folder / "arm.h5"}], [pin("shoulder", "ground", "arm.root")],
+        {"name": "inverse", "kind": "pcid", "end": np.float64(0.02), "output_step": 0.001},
+        name="swing", initial={"state": "static"},
+        trajectory=[{"name": "turn", "joint": "shoulder", "value": "0.5*sin(t)"}],
+    )  # fmt: skip
+    return ffrobot.make_scene(folder=folder, **keys | {"gravity": np.array([0.0, -9.81])} | changes)
 
 
 @pytest.fixture(scope="module")
@@ -97,9 +94,7 @@ def test_link_in_the_scene_is_that_of_its_file(folder, results):
     (folder / "inline.toml").write_text(scene.text, encoding="utf-8")
     assert "[body.link.geometry" in scene.text
     for inline in (scene, folder / "inline.toml"):
-        np.testing.assert_array_equal(
-            ffrobot.solve(inline)["inverse/joints/shoulder/moment"], results["inverse/joints/shoulder/moment"]
-        )
+        np.testing.assert_array_equal(ffrobot.solve(inline)[MOMENT], results[MOMENT])
 
 
 def test_link_made_of_a_dictionary(folder, tmp_path):
@@ -202,9 +197,7 @@ def test_results_in_memory_can_be_saved_and_drawn(folder, results, tmp_path):
     """As those in a file: figures, page, view, the same numbers."""
     saved = results.save(tmp_path / "saved.h5")
     with ffrobot.Results(saved) as again:
-        np.testing.assert_array_equal(
-            again["inverse/joints/shoulder/moment"], results["inverse/joints/shoulder/moment"]
-        )
+        np.testing.assert_array_equal(again[MOMENT], results[MOMENT])
     assert ffrobot.plot_results(results, tmp_path / "figures", ["svg"])
     assert ffrobot.view_file(results, tmp_path / "view", pictures=False)
     ffrobot.write_report(results, tmp_path / "one.html")
@@ -214,21 +207,21 @@ def test_results_in_memory_can_be_saved_and_drawn(folder, results, tmp_path):
         results.save(tmp_path / "one.html")
 
 
-def test_library_that_is_not_installed(results, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(ffrobot.SolveError, match=r"this needs pandas, which is not installed: pip install pan"):
-        results.frame("inverse")
-    monkeypatch.setitem(sys.modules, "xarray", None)
+@pytest.mark.parametrize(("library", "view"), [("pandas", "frame"), ("xarray", "to_xarray")])
+def test_library_that_is_not_installed(results, monkeypatch, library, view):
+    monkeypatch.setitem(sys.modules, library, None)
     monkeypatch.delitem(sys.modules, "ffrobot.results.labelled", raising=False)
-    with pytest.raises(ffrobot.SolveError, match=r"this needs xarray, which is not installed: pip install xarray"):
-        results.to_xarray("inverse")
+    with pytest.raises(
+        ffrobot.SolveError, match=f"this needs {library}, which is not installed: pip install {library}"
+    ):
+        getattr(results, view)("inverse")
 
 
 def test_pandas_view(results):
     frame = results.frame("inverse")
     assert frame.index.name == "time"
     np.testing.assert_array_equal(frame.index, results.time("inverse"))
-    np.testing.assert_array_equal(frame["joints/shoulder/moment"], results["inverse/joints/shoulder/moment"])
+    np.testing.assert_array_equal(frame["joints/shoulder/moment"], results[MOMENT])
     assert "time" not in frame.columns
 
 
@@ -252,11 +245,10 @@ def test_xarray_has_dimensions_units_and_coordinates(results):
 
 def test_verdict_says_what_the_file_holds(folder, tmp_path, capsys):
     """Peaks, RMS and limits of the motor, the deflection, what to try next; `ffrobot solve` prints the answer."""
-    joint = {"name": "shoulder", "type": "revolute", "between": ("ground", "arm.root"), "moment_limit": 0.4}
-    scene = swing(folder, joint=[joint])
+    scene = swing(folder, joint=[pin("shoulder", "ground", "arm.root", moment_limit=0.4)])
     results = ffrobot.solve(scene)
     found = results.verdict["inverse"]
-    moment, deflection = results["inverse/joints/shoulder/moment"], results["inverse/points/arm.tip/deflection"]
+    moment, deflection = results[MOMENT], results["inverse/points/arm.tip/deflection"]
     motor = found.motors["shoulder"]
     assert motor.moment == results.attributes("inverse/joints/shoulder/moment")["peak"] > 0.4
     assert motor.moment == pytest.approx(np.abs(moment).max(), rel=1e-5)  # of outputs, which may miss the top

@@ -1,7 +1,6 @@
 """Peaks, limits and RMS do not depend on `output_step`: closed forms, and runs with a hundred times as many outputs."""
 
 import warnings
-from copy import deepcopy
 
 import numpy as np
 import pytest
@@ -74,14 +73,8 @@ def test_a_jump_of_the_path_between_outputs_is_in_the_peaks_and_reported(tmp_pat
     assert found.moment == pytest.approx(QUINTIC * 0.1 / lasts**2 * J, rel=1e-5)
     assert found.speed == pytest.approx(15 / 8 * 0.1 / lasts, rel=1e-5)
     assert any('trajectory "swing": moves between outputs' in text for text in one.warnings)
-    told = solve(finer(scene, lasts / 20)).verdict["inverse"].warnings
-    assert not any("between outputs" in text for text in told)
-
-
-def finer(scene, step):
-    new = deepcopy(scene)
-    new["analysis"][0]["output_step"] = 1.0 / round(1.0 / step)
-    return new
+    scene["analysis"][0]["output_step"] = 1.0 / round(20 / lasts)
+    assert not any("between outputs" in text for text in solve(scene).verdict["inverse"].warnings)
 
 
 @pytest.mark.parametrize("space", [pytest.param(False, marks=pytest.mark.nightly), True])
@@ -178,15 +171,19 @@ def test_rms_of_motors_alone_is_that_of_the_path():
     assert "over the path" in str(results.verdict)
 
 
+def by_both(scene):
+    """Results of inverse dynamics and of motors only."""
+    (inverse,) = scene["analysis"]
+    return [solve(scene | {"analysis": [inverse | {"kind": kind}]}) for kind in ("pcid", "motors-only")]
+
+
 def test_a_jolt_of_a_joint_that_only_motors_move():
     """A path of joints leaves links to themselves, as inverse dynamics does; collocation has a break at the jolt."""
     rate = np.pi / 6e-4
     scene = flexible(0.1, space=False)
     jolt = f"where(t < 0.1001, 0, where(t < 0.1007, 1e-6*sin({rate}*(t - 0.1001))**4, 0))"
-    scene["trajectory"] = [{"name": "swing", "joint": "O", "value": jolt}]
-    (inverse,) = scene["analysis"]
-    kinds = [{"analysis": [inverse | {"kind": kind}]} for kind in ("pcid", "motors-only")]
-    by_inverse, by_motors = (motor(solve(scene | kind)).moment for kind in kinds)
+    scene["trajectory"][0]["value"] = jolt
+    by_inverse, by_motors = (motor(results).moment for results in by_both(scene))
     assert by_motors == pytest.approx(by_inverse, rel=1e-4)
 
 
@@ -245,10 +242,9 @@ def test_a_brief_load_while_only_motors_move(lasts):
     scene["trajectory"][0]["value"] = "0.3*(35*t**4 - 84*t**5 + 70*t**6 - 20*t**7)"
     force = f"where(t < 0.5011, 0, where(t < {0.5011 + lasts}, {2.5e-3 / lasts}, 0))"
     scene["load"] = [{"point": "arm.tip", "y": force}]
-    (inverse,) = scene["analysis"]
-    found = [solve(scene | {"analysis": [inverse | {"kind": kind}]}) for kind in ("pcid", "motors-only")]
     by_inverse, by_motors = (
-        one["inverse/joints/O/moment"][np.isin(one.time("inverse").round(9), np.arange(101) / 100)] for one in found
+        one["inverse/joints/O/moment"][np.isin(one.time("inverse").round(9), np.arange(101) / 100)]
+        for one in by_both(scene)
     )
     assert np.abs(by_motors - by_inverse).max() < 1e-5 * np.abs(by_inverse).max()
 

@@ -7,6 +7,7 @@ import pytest
 import zoo
 from beam_links import beam_link, rectangle
 from scipy.optimize import brentq
+from tables_3d import pin
 
 from ffrobot import make_scene, solve
 from ffrobot.mbs.linear.statics import Statics
@@ -19,8 +20,9 @@ def rigid(mass, length, inertia=1e-3):
     return {"mass": mass, "inertia": inertia, "center": [length / 2, 0.0], "points": points}
 
 
-def pin(name, first, second, **keys):
-    return {"name": name, "type": "revolute", "between": [first, second]} | keys
+def at_rest(**keys):
+    """Equilibrium of a planar scene."""
+    return solve(make_scene(**{"name": "s", "gravity": [0.0, -9.81], "analysis": [REST]} | keys))
 
 
 @pytest.mark.parametrize("name", ["mixed", "four-bar", "slider-crank", "loaded", "stiffened", "free-flying"])
@@ -47,11 +49,10 @@ def test_stiffness_is_the_derivative_of_forces(name):
 def test_a_flexible_arm_hangs_straight_down(gravity, load):
     """Nothing bends it there: all generalized forces vanish with what is left of them."""
     arm = beam_link(0.5, rectangle(0.01, 0.02), 8, modes={"count": 2, "family": "in-plane-bending"})
-    scene = make_scene(
-        name="arm", gravity=gravity, body=[{"name": "a", "link": arm}], joint=[pin("j", "ground", "a.root")],
-        initial={"joints": {"j": -1.4}}, load=[{"point": "a.tip", "y": load}] if load else [], analysis=[REST],
-    )  # fmt: skip
-    with solve(scene) as results:
+    with at_rest(
+        gravity=gravity, body=[{"name": "a", "link": arm}], joint=[pin("j", "ground", "a.root")],
+        initial={"joints": {"j": -1.4}}, load=[{"point": "a.tip", "y": load}] if load else [],
+    ) as results:  # fmt: skip
         assert results["rest/joints/j/coordinate"][0] == pytest.approx(-np.pi / 2, abs=1e-12)
 
 
@@ -63,8 +64,8 @@ def test_a_slider_crank_may_be_turned_with_its_gravity(angle):
         c, s = np.cos(turn), np.sin(turn)
         rod = beam_link(0.3, rectangle(0.006, 0.01), 8, modes={"count": 2, "family": "in-plane-bending"})
         block = {"mass": 0.3, "inertia": 1e-4, "center": [0.0, 0.0], "points": {"pin": [0.0, 0.0]}}
-        scene = make_scene(
-            name="s", gravity=[9.81 * s, -9.81 * c], analysis=[REST],
+        with at_rest(
+            gravity=[9.81 * s, -9.81 * c],
             body=[{"name": "c", "rigid": rigid(0.4, 0.1)}, {"name": "r", "link": rod}, {"name": "b", "rigid": block}],
             joint=[
                 pin("O", "ground", "c.root", motor=True), pin("A", "c.tip", "r.root"), pin("B", "r.tip", "b.pin"),
@@ -72,8 +73,7 @@ def test_a_slider_crank_may_be_turned_with_its_gravity(angle):
             ],
             initial={"angles": {"c": 0.5 + turn, "r": -0.16 + turn, "b": turn}},
             trajectory=[{"name": "t", "joint": "O", "value": str(0.5 + turn)}],
-        )  # fmt: skip
-        with solve(scene) as results:
+        ) as results:  # fmt: skip
             return float(results["rest/joints/O/moment"][0])
 
     assert moment(angle) == pytest.approx(moment(0.0), rel=1e-9)
@@ -84,18 +84,16 @@ def test_a_gear_in_steps_of_stiffness_winds_under_the_weight(values):
     """M(γ) = m g l/2 cos(θ_m − γ), with a moment that is linear in pieces."""
     knee, mass, length, motor = 1.0, 2.0, 0.6, 0.4
     gear = {"gear_ratio": 50.0, "rotor_inertia": 2e-5, "stiffness": {"values": values, "torques": [knee]}}
-    scene = make_scene(
-        name="g", gravity=[0.0, -9.81], body=[{"name": "a", "rigid": rigid(mass, length)}],
-        joint=[pin("j", "ground", "a.root", **gear)], initial={"joints": {"j": motor}},
-        trajectory=[{"name": "t", "motor": "j", "value": str(motor)}], analysis=[REST],
-    )  # fmt: skip
 
     def left(twist):
         moment = values[0] * min(twist, knee / values[0]) + values[1] * max(twist - knee / values[0], 0.0)
         return moment - mass * 9.81 * length / 2 * np.cos(motor - twist)
 
     expected = motor - brentq(left, 0.0, 0.5, xtol=1e-15)
-    with solve(scene) as results:
+    with at_rest(
+        body=[{"name": "a", "rigid": rigid(mass, length)}], joint=[pin("j", "ground", "a.root", **gear)],
+        initial={"joints": {"j": motor}}, trajectory=[{"name": "t", "motor": "j", "value": str(motor)}],
+    ) as results:  # fmt: skip
         assert results["rest/joints/j/coordinate"][0] == pytest.approx(expected, abs=1e-9)
 
 
@@ -106,13 +104,12 @@ def test_a_chain_of_a_hundred_links_hangs_in_seconds():
     below = 9.81 * mass * (count - 0.5 - np.arange(count))
     angles = -np.arctan(below / pull)
     guess = dict(zip((f"j{k}" for k in range(count)), np.diff(angles, prepend=0.0) * 0.9, strict=True))
-    scene = make_scene(
-        name="chain", gravity=[0.0, -9.81], body=[{"name": name, "rigid": rigid(mass, length)} for name in names],
-        joint=[pin(f"j{k}", f"b{k - 1}.tip" if k else "ground", f"b{k}.root", motor=False) for k in range(count)],
-        load=[{"point": f"{names[-1]}.tip", "x": str(pull)}], initial={"joints": guess}, analysis=[REST],
-    )  # fmt: skip
     began = time.process_time()
-    with solve(scene) as results:
+    with at_rest(
+        body=[{"name": name, "rigid": rigid(mass, length)} for name in names],
+        joint=[pin(f"j{k}", f"b{k - 1}.tip" if k else "ground", f"b{k}.root", motor=False) for k in range(count)],
+        load=[{"point": f"{names[-1]}.tip", "x": str(pull)}], initial={"joints": guess},
+    ) as results:  # fmt: skip
         found = np.cumsum([results[f"rest/joints/j{k}/coordinate"][0] for k in range(count)])
     assert time.process_time() - began < 15.0  # 1 s on a quiet machine
     np.testing.assert_allclose(found, angles, atol=1e-10)

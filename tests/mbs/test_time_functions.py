@@ -94,35 +94,30 @@ def test_random_expressions_have_the_derivatives_of_their_values(seed):
     assert samples[1] @ weights == pytest.approx(samples[2, 3], abs=1e-8 * scale[0] * scale[2])
 
 
-def test_branch_not_selected_does_not_leak():
-    assert parse_expression("where(t < 1, 1/(1 - t), 0)")(1.0) == (0.0, 0.0, 0.0)
-    assert parse_expression("where(t > 0, sqrt(t), t**2)")(0.0) == (0.0, 0.0, 2.0)
+NAN = math.nan
+AT_ONE_TIME = [
+    ("where(t < 1, 1/(1 - t), 0)", 1.0, (0.0, 0.0, 0.0)),  # the branch that is not selected does not leak
+    ("where(t > 0, sqrt(t), t**2)", 0.0, (0.0, 0.0, 2.0)),
+    *(("where(0.2 < t <= 0.5 or not t < 0.9, 1, 0)", t, (k, 0.0, 0.0))
+      for t, k in ((0.2, 0.0), (0.3, 1.0), (0.5, 1.0), (0.6, 0.0), (0.9, 1.0))),
+    ("abs(t)", 0.0, (0.0, 1.0, 0.0)),  # forward in time
+    ("abs(-t**2)", 0.0, (0.0, 0.0, 2.0)),
+    ("log(t)", -1.0, (NAN, NAN, NAN)),  # outside the domain, by component
+    ("1/t", 0.0, (NAN, NAN, NAN)),
+    ("(t - 2)**0.5", 1.0, (NAN, NAN, NAN)),
+    ("sqrt(t)", 0.0, (0.0, NAN, NAN)),
+]  # fmt: skip
 
 
-def test_conditions_chain_and_combine():
-    function = parse_expression("where(0.2 < t <= 0.5 or not t < 0.9, 1, 0)")
-    assert [function(t)[0] for t in (0.2, 0.3, 0.5, 0.6, 0.9)] == [0, 1, 1, 0, 1]
-
-
-def test_abs_differentiates_forward_in_time():
-    assert parse_expression("abs(t)")(0.0) == (0.0, 1.0, 0.0)
-    assert parse_expression("abs(-t**2)")(0.0) == (0.0, 0.0, 2.0)
+@pytest.mark.parametrize(("text", "t", "expected"), AT_ONE_TIME)
+def test_conditions_kinks_and_domains(text, t, expected):
+    np.testing.assert_array_equal(parse_expression(text)(t), expected)
 
 
 def test_constants_among_themselves_mean_what_they_do_with_t():
     """Folded when the expression is read; the same with a zero that depends on t."""
     folded, not_folded = (f"1 + (cos(pi/4 + {zero}) - sqrt(3 + {zero})/2)*t**(1 + {zero} + 1)" for zero in ("0", "0*t"))
     np.testing.assert_array_equal(parse_expression(folded)(1.7), parse_expression(not_folded)(1.7))
-
-
-def test_values_outside_the_domain_are_nan_by_component():
-    assert np.isnan(parse_expression("log(t)")(-1.0)).all()
-    assert np.isnan(parse_expression("1/t")(0.0)).all()
-    assert np.isnan(parse_expression("(t - 2)**0.5")(1.0)).all()
-    value, rate, acceleration = parse_expression("sqrt(t)")(0.0)
-    assert value == 0.0
-    assert math.isnan(rate)
-    assert math.isnan(acceleration)
 
 
 def test_units_are_factors():

@@ -40,17 +40,21 @@ def tool(**keys):
     return {"name": "gripper", "point": "c.end", "at": [0.05, -0.02, 0.15], "rpy": list(RPY)} | keys
 
 
+def rotations_of(results):
+    """Rotations of the three bodies over time, by the coordinates of their joints."""
+    q = [results[f"move/joints/to_{name}/coordinate"].ravel() for name in "abc"]
+    one, two = Rotation.from_euler("z", q[0]), Rotation.from_euler("z", q[0]) * Rotation.from_euler("y", q[1])
+    return one, two, two * Rotation.from_euler("x", q[2])
+
+
 def test_the_orientation_of_a_tool_follows_its_path():
     """A path of a tool is that of its body turned back by the tool's rpy: the same angles of the joints."""
     path = [f"{0.2 * k} + 0.3*t**2" for k in range(1, 4)]
     with solve(wrist(trajectory=[{"name": "turn", "point": "c.gripper", "rpy": path}])) as of_tool:
-        q = [of_tool[f"move/joints/to_{name}/coordinate"].ravel() for name in "abc"]
-        times = of_tool["move/time"]
+        (one, two, A), times = rotations_of(of_tool), of_tool["move/time"]
         place = of_tool["move/points/c.gripper/position"]
-    A = Rotation.from_euler("z", q[0]) * Rotation.from_euler("y", q[1]) * Rotation.from_euler("x", q[2])
     wanted = Rotation.from_euler("xyz", np.array([0.2, 0.4, 0.6]) + 0.3 * times[:, None] ** 2)
     np.testing.assert_allclose((A * Rotation.from_matrix(turned(RPY))).as_matrix(), wanted.as_matrix(), atol=1e-9)
-    one, two = Rotation.from_euler("z", q[0]), Rotation.from_euler("z", q[0]) * Rotation.from_euler("y", q[1])
     end = np.array([0.1, 0.0, 0.2])
     expected = one.apply(end) + two.apply(end) + A.apply([0.15, -0.02, 0.35])
     np.testing.assert_allclose(place, expected, atol=1e-9)
@@ -61,9 +65,7 @@ def test_a_direction_of_a_tool_is_in_its_axes():
     keys = {"name": "point", "point": "c.gripper", "tool_axis": [0.0, 0.0, 1.0], "direction": ["0.2", "t", "1"]}
     held = {"name": "held", "joint": "to_a", "value": "0.3"}
     with solve(wrist(trajectory=[keys, held])) as results:
-        q = [results[f"move/joints/to_{name}/coordinate"].ravel() for name in "abc"]
-        times = results["move/time"]
-    A = Rotation.from_euler("z", q[0]) * Rotation.from_euler("y", q[1]) * Rotation.from_euler("x", q[2])
+        (*_, A), times = rotations_of(results), results["move/time"]
     along = A.apply(turned(RPY)[:, 2])
     wanted = np.stack([np.full_like(times, 0.2), times, np.ones_like(times)], axis=1)
     np.testing.assert_allclose(along, wanted / np.linalg.norm(wanted, axis=1)[:, None], atol=1e-9)

@@ -52,10 +52,10 @@ def strip(modes, T, pairs=4):
     return servo, directions[:, servo.of_modes].T
 
 
-def asked(servo, Phi_V, span, objective, limit, *, is_free=False, V_ref=200.0):
-    limits = Limits(amplifiers(np.full(Phi_V.shape[1], float(limit))), np.full(1, np.inf))
-    rest = tuple(equilibrium(servo, t) for t in span)
-    return Transition(servo, Phi_V, limits, Weights(0.4, V_ref, 0.005), rest, objective, is_free)
+def asked(servo, Phi_V, objective, limit, *, is_free=False, V_ref=200.0, motors=1, tau_ref=0.4):
+    limits = Limits(amplifiers(np.full(Phi_V.shape[1], float(limit))), np.full(motors, np.inf))
+    rest = tuple(equilibrium(servo, t) for t in (0.0, servo.end))
+    return Transition(servo, Phi_V, limits, Weights(tau_ref, V_ref, 0.005), rest, objective, is_free)
 
 
 class OneMode:
@@ -120,9 +120,7 @@ def arm(modes, patches, T, of_joints=()):
 
 
 def asked_of_arm(servo, Phi_V, objective, limit, *, is_free):
-    limits = Limits(amplifiers(np.full(Phi_V.shape[1], float(limit))), np.full(2, np.inf))
-    rest = tuple(equilibrium(servo, t) for t in (0.0, servo.end))
-    return Transition(servo, Phi_V, limits, Weights(50.0, 200.0, 0.005), rest, objective, is_free)
+    return asked(servo, Phi_V, objective, limit, is_free=is_free, motors=2, tau_ref=50.0)
 
 
 @pytest.mark.parametrize(
@@ -154,7 +152,7 @@ ROUNDED_TO_VOLTS = (8, 4, 0.6, 64, 129.8), (6, 4, 0.6, 128, 131.6), (6, 6, 0.6, 
 )  # fmt: skip
 def test_least_voltage(modes, pairs, T, intervals, expected, within):
     servo, Phi_V = strip(modes, T, pairs)
-    found = track(asked(servo, Phi_V, (0.0, T), "least-voltage", 200.0, is_free=True), graded(0.0, T, intervals))
+    found = track(asked(servo, Phi_V, "least-voltage", 200.0, is_free=True), graded(0.0, T, intervals))
     assert found.converged
     assert 200.0 * found.share == pytest.approx(expected, rel=within)
 
@@ -199,7 +197,7 @@ def breaks_of_the_notes(T):
 )
 def test_least_voltage_within_a_path_tolerance(modes, T, error, expected):
     servo, Phi_V = strip(modes, T)
-    problem = within_tolerance(servo, asked(servo, Phi_V, (0.0, T), "least-voltage", 100.0, V_ref=100.0), error)
+    problem = within_tolerance(servo, asked(servo, Phi_V, "least-voltage", 100.0, V_ref=100.0), error)
     found = track(problem, breaks_of_the_notes(T), None, 1e-3)
     assert found.converged
     assert 100.0 * found.share == pytest.approx(expected, rel=1e-2, abs=1e-3)
@@ -235,7 +233,7 @@ def test_price_of_a_path_tolerance():
     servo, Phi_V = strip(4, 0.5)
     least = []
     for error in (1e-4, 0.95e-4, 1.05e-4):
-        problem = within_tolerance(servo, asked(servo, Phi_V, (0.0, 0.5), "least-voltage", 100.0, V_ref=100.0), error)
+        problem = within_tolerance(servo, asked(servo, Phi_V, "least-voltage", 100.0, V_ref=100.0), error)
         least.append(track(problem, breaks_of_the_notes(0.5), None, 1e-4))
     price = price_of_tolerance(problem, least[0])
     assert price == pytest.approx(100.0 * (least[1].share - least[2].share) / 1e-5, rel=1e-2)
@@ -288,7 +286,7 @@ def seventh(s):
 def test_bounds_of_zeros():
     """Section 7: what the slowest zeros ask for at least; less than what is needed."""
     servo, Phi_V = strip(4, 0.5)
-    problem = asked(servo, Phi_V, (0.0, 0.5), "least-voltage", 200.0)
+    problem = asked(servo, Phi_V, "least-voltage", 200.0)
     found = bounds_of_zeros(problem, linearise(servo, 0.5), (0.0, 0.0))
     assert found.voltages.max() == pytest.approx(200.90, abs=1e-2)
     assert found.zeros[found.voltages.argmax()].real == pytest.approx(-64.405, abs=1e-3)
@@ -308,7 +306,7 @@ def test_prices_of_limits():
     servo, Phi_V = strip(2, 0.7)
     breaks, tracked = graded(0.0, 0.7, 40), []
     for V_max, tau_max in ((120.0, 0.825), (120.5, 0.825), (119.5, 0.825), (120.0, 0.826), (120.0, 0.824)):
-        problem = asked(servo, Phi_V, (0.0, 0.7), "effort", V_max)
+        problem = asked(servo, Phi_V, "effort", V_max)
         found = track(replace(problem, limits=Limits(problem.limits.patches, np.array([tau_max]))), breaks)
         assert found.converged
         tracked.append(found)
@@ -324,7 +322,7 @@ SLOWEST = 65.0  # 1/s, of the strip's zeros: −64.405 and 67.248
 def test_least_voltage_settles():
     """Checkpoint 2 at 400 intervals lies within the doubt of a few dozens, to which 32 come by themselves."""
     servo, Phi_V = strip(2, 0.8)
-    problem = replace(asked(servo, Phi_V, (0.0, 0.8), "least-voltage", 200.0, is_free=True), rate=SLOWEST)
+    problem = replace(asked(servo, Phi_V, "least-voltage", 200.0, is_free=True), rate=SLOWEST)
     breaks = graded(0.0, 0.8, 32)
     first, found = track(problem, breaks, None, 1e-3), settled(problem, breaks)
     assert found.converged
@@ -338,7 +336,7 @@ def test_least_voltage_settles():
 def test_least_voltage_within_a_path_tolerance_settles():
     """On intervals that follow ë, too: an independent, far finer mesh lies within the doubt."""
     servo, Phi_V = strip(2, 0.6)
-    problem = asked(servo, Phi_V, (0.0, 0.6), "least-voltage", 200.0)
+    problem = asked(servo, Phi_V, "least-voltage", 200.0)
     problem = replace(problem, rate=SLOWEST, tolerance=Tolerance(3e-4))
     found = settled(problem, graded(0.0, 0.6, 32))
     fine = track(problem, graded(0.0, 0.6, 300), None, 1e-3)
@@ -349,7 +347,7 @@ def test_least_voltage_within_a_path_tolerance_settles():
 def test_least_effort():
     """Checkpoint 3, at 140 intervals."""
     servo, Phi_V = strip(4, 0.7)
-    found = track(asked(servo, Phi_V, (0.0, 0.7), "effort", 120.0), graded(0.0, 0.7, 140))
+    found = track(asked(servo, Phi_V, "effort", 120.0), graded(0.0, 0.7, 140))
     assert found.converged
     assert found.cost == pytest.approx(0.0454892, abs=1e-7)
     breaks, V = found.voltage.x, found.voltage(found.voltage.x)
