@@ -1,6 +1,7 @@
 """The arm of two steel links in the plane, with modes by stage 1."""
 
 from beam_links import paper_link
+from tables_3d import pin, planar
 
 import ffrobot
 
@@ -17,20 +18,11 @@ def two_links(count, attachment, kept=None, rise=1.0, **keys):
     ]
     s = f"(t/{rise})"
     way = f"(10*{s}**3-15*{s}**4+6*{s}**5)"
-    scene = {
-        "name": "arm",
-        "gravity": [0.0, -9.81],
-        "body": bodies,
-        "joint": [
-            {"name": "O", "type": "revolute", "between": ["ground", "a.root"]},
-            {"name": "A", "type": "revolute", "between": ["a.tip", "b.root"]},
-        ],
-        "payload": [{"point": "b.tip", "mass": 2.0}],
-        "trajectory": [
-            {"name": "first", "joint": "O", "value": f"0.2+0.8*{way}"},
-            {"name": "second", "joint": "A", "value": f"-0.5+0.7*{way}"},
-        ],
-        "initial": {"state": "static", "angles": {"a": 0.2, "b": -0.3}},
-        "analysis": [{"name": "swing", "kind": "pcid", "end": rise, "output_step": 0.005, "tolerance": 1e-6}],
-    }
-    return ffrobot.make_scene(**(scene | keys))
+    tables = planar(
+        bodies, [pin("O", "ground", "a.root"), pin("A", "a.tip", "b.root")],
+        {"name": "swing", "kind": "pcid", "end": rise, "output_step": 0.005, "tolerance": 1e-6},
+        payload=[{"point": "b.tip", "mass": 2.0}], initial={"state": "static", "angles": {"a": 0.2, "b": -0.3}},
+        trajectory=[{"name": "first", "joint": "O", "value": f"0.2+0.8*{way}"},
+                    {"name": "second", "joint": "A", "value": f"-0.5+0.7*{way}"}],
+    )  # fmt: skip
+    return ffrobot.make_scene(**tables | keys)

@@ -192,8 +192,7 @@ def test_motors_of_a_redefined_output_are_those_of_less_deflection(types, loops)
     seen[0] += shift
     on_path = _core.SpatialPrescribedMotion(path, near[0]).motion(TIMES.tolist(), *seen, near)
     for motor in motors:
-        node = next(node for node in model.tree.nodes if node.v.start <= motor.coordinate < node.v.stop)
-        place = node.q.start + motor.coordinate - node.v.start
+        _, place = tree_oracle.of_coordinate(model.tree, motor.coordinate)
         np.testing.assert_allclose(found.q[:, place], on_path.q[:, place], atol=1e-11)
         for x, y in ((found.v, on_path.v), (found.a, on_path.a)):
             of_path = y[:, motor.coordinate]
@@ -213,8 +212,7 @@ def with_motors_held(model, motors):
     """The model with coordinates of motors that stand still for its path."""
     rows = list(model.rows)
     for motor in motors:
-        node = next(node for node in model.tree.nodes if node.v.start <= motor.coordinate < node.v.stop)
-        (row,) = coordinate_rows(node, [motor.coordinate])
+        (row,) = coordinate_rows(tree_oracle.of_coordinate(model.tree, motor.coordinate)[0], [motor.coordinate])
         rows.append(replace(row, target=_core.TimeFunction.constant(0.0)))
     return replace(model, rows=tuple(rows))
 

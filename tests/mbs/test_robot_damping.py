@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 from beam_links import beam_link
+from tables_3d import ORIGIN, pin, planar, revolute, rigid, scene
 
 import ffrobot
 from ffrobot.common.errors import InputError
 from ffrobot.run.solve import prepare_scene
 
 RATIO = 0.01
+AT_REST = {"name": "at_rest", "kind": "linear"}
 
 
 def link(name, condition, of, section=None, **modes):
@@ -24,19 +26,16 @@ def link(name, condition, of, section=None, **modes):
 def planar_arm(conditions, of):
     """The two-link arm of docs/theory.md, Damping."""
     names = ("link1", "link2")
-    return {
-        "name": "arm", "gravity": [0.0, 0.0],
-        "body": [{"name": n, "link": link(n, c, of)} for n, c in zip(names, conditions, strict=True)],
-        "joint": [{"name": "O", "type": "revolute", "between": ["ground", "link1.root"]},
-                  {"name": "A", "type": "revolute", "between": ["link1.tip", "link2.root"]}],
-        "payload": [{"point": "link2.tip", "mass": 2.0}], "initial": {"angles": {"link1": 0.4, "link2": -0.6}},
-        "analysis": [{"name": "at_rest", "kind": "linear"}],
-    }  # fmt: skip
+    return planar(
+        [{"name": n, "link": link(n, c, of)} for n, c in zip(names, conditions, strict=True)],
+        [pin("O", "ground", "link1.root"), pin("A", "link1.tip", "link2.root")], AT_REST, gravity=[0.0, 0.0],
+        payload=[{"point": "link2.tip", "mass": 2.0}], initial={"angles": {"link1": 0.4, "link2": -0.6}},
+    )  # fmt: skip
 
 
-def vibrations_of(scene):
+def vibrations_of(tables):
     """Frequencies (Hz) and damping ratios of the linear model of a scene, without rigid motion."""
-    with ffrobot.solve(ffrobot.make_scene(**scene)) as results:
+    with ffrobot.solve(ffrobot.make_scene(**tables)) as results:
         frequency, ratio = (results[f"at_rest/linear/{key}"][0] for key in ("frequency", "damping_ratio"))
     return frequency[frequency > 0.0], ratio[frequency > 0.0]
 
@@ -69,32 +68,19 @@ SIDES = ("simply-supported", "cantilever")
 
 def arm_in_3d(conditions, of):
     """Yaw, pitch and, with two links, pitch; tubes that bend in both planes, stretch and twist."""
-    modes = {"family": "all", "count": 6}
-    points = {"root": [0.0, 0.0, 0.0], "top": [0.0, 0.0, 0.3]}
-    column = {"mass": 5.0, "center": [0.0, 0.0, 0.15], "inertia": [0.05, 0.05, 0.02], "points": points}
-    names = ("upper", "fore")[: len(conditions)]
-    between = (("waist", "column.top", "upper.root"), ("elbow", "upper.tip", "fore.root"))
-    return {
-        "name": "arm",
-        "space": "spatial",
-        "gravity": [0.0, 0.0, 0.0],
-        "body": [
-            {"name": "column", "rigid": column},
-            *({"name": n, "link": link(n, c, of, TUBE, **modes)} for n, c in zip(names, conditions, strict=True)),
-        ],
-        "joint": [
-            {"name": "turn", "type": "revolute", "between": ["ground", "column.root"], "axis": [0.0, 0.0, 1.0]},
-            *(
-                {"name": name, "type": "revolute", "between": sides, "axis": [0.0, -1.0, 0.0]}
-                for name, *sides in between[: len(conditions)]
-            ),
-        ],
-        "payload": [
-            {"point": f"{names[-1]}.tip", "mass": 1.0, "center": [0.0, 0.05, 0.02], "inertia": [1e-3, 2e-3, 2e-3]}
-        ],
-        "initial": {"joints": {"turn": 0.3, "waist": 0.7} | ({"elbow": -1.1} if len(conditions) > 1 else {})},
-        "analysis": [{"name": "at_rest", "kind": "linear"}],
-    }
+    links = [
+        {"name": name, "link": link(name, condition, of, TUBE, family="all", count=6)}
+        for name, condition in zip(("upper", "fore"), conditions, strict=False)
+    ]
+    column = rigid("column", 5.0, (0.05, 0.05, 0.02), [0.0, 0.0, 0.15], top=[0.0, 0.0, 0.3])
+    hinges = [revolute("waist", "column.top", "upper.root", [0, -1, 0]),
+              revolute("elbow", "upper.tip", "fore.root", [0, -1, 0])][: len(links)]  # fmt: skip
+    load = {"point": f"{links[-1]['name']}.tip", "center": [0.0, 0.05, 0.02]}
+    return scene(
+        [column, *links], [revolute("turn", "ground", "column.root"), *hinges], AT_REST, gravity=ORIGIN,
+        payload=[load | {"mass": 1.0, "inertia": [1e-3, 2e-3, 2e-3]}],
+        initial={"joints": {"turn": 0.3, "waist": 0.7} | ({"elbow": -1.1} if len(links) > 1 else {})},
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("condition", SIDES)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
+from tables_3d import pin, planar
 
 from ffrobot.common.errors import InputError
 from ffrobot.run.solve import solve_scene
@@ -25,26 +26,17 @@ def point(space, x):
 
 def parallelogram(space, tolerance):
     """Cranks under a coupler that fall from 1 rad above the flat posture."""
-    cranks = ("crank0", "crank1")
+    cranks, ends, joints = ("crank0", "crank1"), ("root", "tip"), []
+    for k, (name, end) in enumerate(zip(cranks, ends, strict=True)):
+        joints.append(pin(f"foot{k}", "ground", f"{name}.root", at=point(space, k * FOOT)))
+        joints.append(pin(f"head{k}", f"{name}.tip", f"coupler.{end}"))
     bodies = [{"name": name, "rigid": rod(space, 0.5, CRANK)} for name in cranks]
-    axis = {} if space == "planar" else {"axis": [0.0, 0.0, 1.0]}
-    joints = [
-        {"name": f"foot{k}", "type": "revolute", "between": ["ground", f"{name}.root"], "at": point(space, k * FOOT)}
-        for k, name in enumerate(cranks)
-    ]
-    joints += [
-        {"name": f"head{k}", "type": "revolute", "between": [f"{name}.tip", f"coupler.{end}"]}
-        for k, (name, end) in enumerate(zip(cranks, ("root", "tip"), strict=True))
-    ]
-    return make_scene(
-        name="parallelogram",
-        space=space,
-        gravity=[0.0, -9.81] if space == "planar" else [0.0, -9.81, 0.05],
-        body=[*bodies, {"name": "coupler", "rigid": rod(space, 0.8, FOOT)}],
-        joint=[joint | axis for joint in joints],
-        initial={"joints": {"foot0": 1.0, "foot1": 1.0, "head0": -1.0}},
-        analysis=[{"name": "fall", "kind": "forward", "end": 1.0, "output_step": 0.01, "tolerance": tolerance}],
-    )
+    bodies.append({"name": "coupler", "rigid": rod(space, 0.8, FOOT)})
+    axis, gravity = ({}, [0.0, -9.81]) if space == "planar" else ({"axis": [0.0, 0.0, 1.0]}, [0.0, -9.81, 0.05])
+    fall = {"name": "fall", "kind": "forward", "end": 1.0, "output_step": 0.01, "tolerance": tolerance}
+    initial = {"joints": {"foot0": 1.0, "foot1": 1.0, "head0": -1.0}}
+    joints = [joint | axis for joint in sorted(joints, key=lambda joint: joint["name"])]  # feet first
+    return make_scene(**planar(bodies, joints, fall, gravity=gravity, space=space, initial=initial))
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-8])

@@ -23,14 +23,19 @@ GROUND = Section(-1, "", np.eye(3), np.zeros(3))
 JOINT = (tree_oracle.motion_of_joint, tree_oracle.action)
 
 
+def built(tree, turned=False):
+    """The tree with joints along their axes, its model, and coordinates without modes."""
+    plain, tables = as_scene(tree, turned)
+    model = tree_model(plain, tables)
+    return plain, model, model.tree.at_rest(coordinates(model, plain, turned))
+
+
 @pytest.mark.parametrize("turned", [False, True], ids=["outwards", "inwards"])
 @pytest.mark.parametrize("seed", range(6))
 def test_bodies_stand_where_the_oracle_has_them(seed, turned):
     rng = np.random.default_rng(seed)
     tree = random_tree(rng, rng.permutation(TYPES)[:6], size=0.1)
-    plain, tables = as_scene(tree, turned)
-    model = tree_model(plain, tables)
-    q = model.tree.at_rest(coordinates(model, plain, turned))
+    plain, model, q = built(tree, turned)
     mechanism = plain.mechanism()
     p = [mechanism.coordinates.parts(tree.q, body.name)[2] for body in tree.bodies]
     expected = placed(plain, p)
@@ -47,9 +52,7 @@ def test_jacobians_by_differences(turned):
     """L of every frame and section, and C_v of all rows of loops, against differences along `integrate`."""
     rng = np.random.default_rng(7)
     tree = random_tree(rng, TYPES, loops=3)
-    plain, tables = as_scene(tree, turned)
-    model = tree_model(plain, tables)
-    q, h = model.tree.at_rest(coordinates(model, plain, turned)), 1e-6
+    (_, model, q), h = built(tree, turned), 1e-6
     for node in model.tree.nodes:
         q[node.p_q] = 0.1 * rng.standard_normal(node.body.n_modes)
     steps = h * np.eye(model.tree.n_v)
@@ -75,9 +78,7 @@ def test_rows_of_loops_hold_where_the_oracle_has_them():
         tree = random_tree(np.random.default_rng(seed), ["revolute", "spherical", "cylindrical"], loops=2)
         if any(joint.type == "screw" for joint in tree.loops):
             continue
-        plain, tables = as_scene(tree, turned=False)
-        model = tree_model(plain, tables)
-        q = model.tree.at_rest(coordinates(model, plain, turned=False))
+        plain, model, q = built(tree)
         mechanism = plain.mechanism()
         for node in model.tree.nodes:
             q[node.p_q] = mechanism.coordinates.parts(tree.q, node.body.name)[2]
@@ -122,8 +123,7 @@ def test_core_moves_trees_and_measures_rows_as_numpy_does(seed, turned):
     rng = np.random.default_rng(100 + seed)
     kinds = ("rigid", "solid", "beam", "supported beam") if seed % 2 else ("stiffened solid", "stiffened beam", "rigid")
     tree = random_tree(rng, rng.permutation(TYPES), kinds, chain=seed > 1, loops=3 * (seed % 2))
-    plain, tables = as_scene(tree, turned)
-    assert_core_is_the_oracle(rng, tree_model(plain, tables))
+    assert_core_is_the_oracle(rng, built(tree, turned)[1])
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -172,10 +172,8 @@ def test_postures_keep_to_loops(types):
     """Where Newton's method converges in the core, NumPy's C is zero, and modes are where they were."""
     rng = np.random.default_rng(5)
     tree = random_tree(rng, types, ("rigid", "solid"), chain=True, loops=1)
-    plain, tables = as_scene(tree, turned=False)
-    model = tree_model(plain, tables)
-    q = np.tile(model.tree.at_rest(coordinates(model, plain, turned=False)), (5, 1))
-    q = tree_oracle.integrate(model.tree, q, 0.1 * rng.standard_normal((5, model.tree.n_v)))
+    _, model, q = built(tree)
+    q = tree_oracle.integrate(model.tree, np.tile(q, (5, 1)), 0.1 * rng.standard_normal((5, model.tree.n_v)))
     found, is_met = model.constraints.postures(q, np.zeros(5))
     assert is_met.any()
     np.testing.assert_allclose(row_values(model, found[is_met], np.zeros(5)[is_met])[0], 0.0, atol=1e-11)
@@ -189,8 +187,7 @@ def test_mobility_is_that_of_numpys_gradients(seed):
     rng = np.random.default_rng(seed)
     tree = random_tree(rng, ("prismatic", "spherical", "revolute", "cylindrical", "universal", "revolute"), ("solid",),
                        chain=True, loops=1)  # fmt: skip
-    plain, tables = as_scene(tree, turned=False)
-    model = tree_model(plain, tables)
+    model = built(tree)[1]
     last = len(model.tree.nodes) - 1
     path = [ConstraintRow("path", "point", GROUND, Section(last, "tip", np.eye(3), np.zeros(3)), e, e,
                           target=_core.TimeFunction.polynomial(np.array([-1.0, 1.0]), rng.standard_normal((1, 4))))

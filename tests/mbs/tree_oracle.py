@@ -170,10 +170,10 @@ def _by_modes(body, section, p):
     return u_p, left_jacobian(section.turned(phi[..., None])[..., 0]) @ section.turned(phi_p)
 
 
-def _place_in_q(tree, coordinate):
-    """Index in q of v[coordinate], which is a number's rate."""
+def of_coordinate(tree, coordinate):
+    """The node whose joint has v[coordinate], which is a number's rate, and the index of that number in q."""
     node = next(node for node in tree.nodes if node.v.start <= coordinate < node.v.stop)
-    return node.q.start + coordinate - node.v.start
+    return node, node.q.start + coordinate - node.v.start
 
 
 def value_and_gradient(tree, row, a, b, q, times):
@@ -182,7 +182,7 @@ def value_and_gradient(tree, row, a, b, q, times):
     if row.target is not None:
         value = value - row.target.sample(times)[0]
     if row.kind in ("turn", "slide") and row.coordinate >= 0:
-        value = value - q[:, _place_in_q(tree, row.coordinate)]
+        value = value - q[:, of_coordinate(tree, row.coordinate)[1]]
         gradient[:, row.coordinate] -= 1.0
     return value - 2 * np.pi * np.round(value / (2 * np.pi)) if row.kind == "turn" else value, gradient
 
@@ -192,7 +192,7 @@ def _measured(tree, row, a, b, q, times):
     if row.kind == "coordinate":
         gradient = np.zeros((len(q), a.L.shape[-1]))
         gradient[:, row.coordinate] = row.sign
-        return row.sign * q[:, _place_in_q(tree, row.coordinate)], gradient
+        return row.sign * q[:, of_coordinate(tree, row.coordinate)[1]], gradient
     turning = b.L[:, 3:] - a.L[:, 3:]
     if row.kind == "rotation":
         assert row.law is not None

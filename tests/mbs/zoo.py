@@ -27,11 +27,14 @@ def tip_path(body, c=(1.0, 0.5)):
     return {"name": "tip", "point": f"{body}.tip", "x": f"{c[0]}+0.3*t-0.2*t**2", "y": f"{c[1]}-0.4*t+0.5*t**2"}
 
 
-def chain(rng, count, **keys):
+def serial(count):
     """Revolute joints only, the tip of the last link on a path."""
     angles = {f"b{k}": 1.2 * (-0.6) ** (k - 1) for k in range(1, count + 1)}
-    tables = {"joint": serial_joints(count), "trajectory": [tip_path(f"b{count}")], "initial": {"angles": angles}}
-    return make_model(clouds(rng, count), **(tables | keys))
+    return {"joint": serial_joints(count), "trajectory": [tip_path(f"b{count}")], "initial": {"angles": angles}}
+
+
+def chain(rng, count, **keys):
+    return make_model(clouds(rng, count), **(serial(count) | keys))
 
 
 def swapped(joints):
@@ -54,9 +57,8 @@ def mixed(rng, **keys):
         {"name": "turn", "angle": "b3.side", "value": "0.1+0.2*t"},
         {"name": "lift", "point": "b4.side", "y": "0.6*cos(t)"},
     ]
-    angles = {"b1": 0.3, "b2": 0.9, "b3": -0.4, "b4": 0.2}
-    tables = {"joint": MIXED, "trajectory": trajectories, "initial": {"angles": angles}} | keys
-    return make_model(clouds(rng, 4), **tables)
+    initial = {"angles": {"b1": 0.3, "b2": 0.9, "b3": -0.4, "b4": 0.2}}
+    return make_model(clouds(rng, 4), **({"joint": MIXED, "trajectory": trajectories, "initial": initial} | keys))
 
 
 def mixed_backwards(rng, **keys):
@@ -103,17 +105,15 @@ def loaded(rng, **keys):
     bodies = clouds(rng, 2)
     bodies[1] = with_payload(bodies[1], "tip", 0.6, np.zeros(3), np.diag([0.0, 0.0, 0.02]))
     patches = [ModalLoad("b1", rng.standard_normal(bodies[0].n_modes), parse_expression(f"2-{k}*t")) for k in range(2)]
-    tables = {"trajectory": [tip_path("b2")], "load": LOADS, "initial": {"angles": {"b1": 1.2, "b2": -0.7}}}
-    return make_model(bodies, patches, **({"joint": serial_joints(2)} | tables | keys))
+    tables = serial(2) | {"load": LOADS, "initial": {"angles": {"b1": 1.2, "b2": -0.7}}}
+    return make_model(bodies, patches, **(tables | keys))
 
 
 def stiffened(rng, **keys):
     """A chain of three bodies whose modes stiffen under every kind of load, with a payload and loads."""
     bodies = [with_stiffening(rng, body) for body in clouds(rng, 3)]
     bodies[1] = with_payload(bodies[1], "tip", 0.6, np.zeros(3), np.diag([0.0, 0.0, 0.02]))
-    angles = {f"b{k}": 1.2 * (-0.6) ** (k - 1) for k in range(1, 4)}
-    tables = {"trajectory": [tip_path("b3")], "load": LOADS, "initial": {"angles": angles}}
-    return make_model(bodies, **({"joint": serial_joints(3)} | tables | keys))
+    return make_model(bodies, **(serial(3) | {"load": LOADS} | keys))
 
 
 def stiffened_and_driven(rng, **keys):
