@@ -41,20 +41,18 @@ class OrientationLaw:
         return self.in_core.sample(times)[0].reshape(-1, 3, 3)
 
 
-def orientation_of(table: Waypoints) -> tuple[Waypoints, Reference]:
-    """Convert columns qw, qx, qy, qz of a table to a rotation vector, rad, and the reference orientation that it turns.
+def orientation_of(table: Waypoints) -> tuple[Array, Reference]:
+    """Convert columns qw, qx, qy, qz of a table to rotation vectors (T, 3), rad, about the middle of all, and it.
 
-    The vector is log(A A_refᵀ) about the mean orientation. Splines of it are smooth; piecewise interpolation of
-    quaternions would jump in angular velocity. Raises `InputError` for a row that is no
-    unit quaternion, and for orientations too far apart for one rotation vector.
+    Splines of log(A A_refᵀ) are smooth; piecewise interpolation of quaternions would jump in angular velocity. Raises
+    `InputError` for a row that is no unit quaternion, and for orientations too far apart for one rotation vector.
     """
     columns = [table.columns.index(name) for name in QUATERNION]
     e = table.values[:, columns]
     length = np.linalg.norm(e, axis=1)
     if (bad := np.flatnonzero(np.abs(length - 1) > UNIT)).size:
         raise InputError(f"row {bad[0] + 1}: expected qw, qx, qy, qz of length 1", f"{length[bad[0]]:.6g}")
-    psi, reference = about_their_middle(of_quaternion(e / length[:, None]), "row")
-    return Waypoints(("rx", "ry", "rz"), table.times, psi), reference
+    return about_their_middle(of_quaternion(e / length[:, None]), "row")
 
 
 def about_their_middle(A: Array, each: str) -> tuple[Array, Reference]:

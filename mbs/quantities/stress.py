@@ -60,15 +60,14 @@ class BodyStress:
 
     def largest(self) -> tuple[float, int, str]:
         """Largest von Mises stress in Pa, at which output, and where: a point's name or a position on the surface."""
-        places = []
-        for name, point in self.points.items():
-            k = int(np.argmax(point.von_mises))
-            places.append((float(point.von_mises[k]), k, name))
+        histories = [(point.von_mises, name) for name, point in self.points.items()]
         if self.surface is not None:
-            k = int(np.argmax(self.surface.von_mises_max))
-            place = ", ".join(f"{c:.4g}" for c in self.surface.position_of_max[k])
-            places.append((float(self.surface.von_mises_max[k]), k, f"({place}) m"))
-        return max(places, key=lambda entry: entry[0])
+            histories.append((self.surface.von_mises_max, ""))
+        values, name = max(histories, key=lambda history: float(history[0].max()))
+        k = int(values.argmax())
+        if self.surface is not None and not name:
+            name = f"({', '.join(f'{c:.4g}' for c in self.surface.position_of_max[k])}) m"
+        return float(values[k]), k, name
 
 
 @struct

@@ -32,6 +32,7 @@ from ...common.arrays import Array
 from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
 from ...fe_models.modal_body.unit_loads import interface_load_names
+from ..model.nodes import Node
 from ..run.record import Run
 from .link_loads import loads_in_equations
 from .motion import constraint_rows, cut_motions, node_of, places
@@ -135,24 +136,14 @@ class Missing(NamedTuple):
         return Missing(max(self.of_length, min(in_proportion, worst.of_length)), worst.of_deflections)
 
 
-class Rotations(NamedTuple):
-    """Largest rotations of sections (rad): twist from the root on, about y and z from the chord."""
-
-    twist: float
-    bending_y: float
-    bending_z: float
-
-
-def missing_to_first_order(
-    loads: ModalLoads, p: Array, stations: Array, places: Array, length: float, *, is_at_rest: bool
-) -> Missing:
+def missing_to_first_order(link: ModalBody, T: Array, p: Array, loads: ModalLoads, *, is_at_rest: bool) -> Missing:
     """Return the errors of a link without geometric stiffening; infinite if loads at rest buckle it.
 
-    p (T, n), √kg·m, are modal coordinates, `stations` (k, 3, n) translations of stations at `places` (k, 3), m, of a
-    link with that `length`, m.
+    At p (T, n), √kg·m, of the equations; T times these are those of the file.
     """
     if not len(p) or not loads.f.size:
         return Missing(0.0, 0.0)
+    stations, places, length = link.stations.translation @ T, link.stations.position, link.length
     # Outputs whose Δp, or whose −½ pᵀK p, may be the largest
     energy = np.sqrt((p**2 * loads.stiffness).sum(axis=1))
     sizes = np.sqrt(loads.squares) * energy, energy
@@ -187,22 +178,21 @@ def _carried(support: LoadedPoint, moved: Array, places: Array) -> Array:
     return moved[:3] + np.cross(moved[3:].T, arms[:, None]).swapaxes(1, 2)
 
 
-def missing_to_second_order(
-    displacement: float, shortening: float, rotations: Rotations, stiffness_change: float
-) -> Missing:
-    """Return the errors of a link with geometric stiffening, from d and s (of its length), rotations and μ."""
+def missing_to_second_order(link: ModalBody, p: Array, shortening: float, stiffness_change: float) -> Missing:
+    """Return the errors of a link with geometric stiffening at p (T, n), √kg·m, of the file.
+
+    From its displacement and `shortening` (of its length), its rotations (twist from the root on, bending from the
+    chord) and μ.
+    """
     if stiffness_change >= 1.0:
         return Missing(np.inf, np.inf)
-    of_deflections = sum(angle**2 for angle in rotations) / 3 / (1 - stiffness_change) ** 2
-    return Missing(min(of_deflections * displacement, shortening / 2), min(1.0, of_deflections))
-
-
-def largest_rotations(link: ModalBody, p: Array) -> Rotations:
-    """Return the largest rotations of sections, rad, over p (T, n), √kg·m, of the file."""
     stations, x = link.stations, link.stations.position[:, 0]
     chord = (stations.translation[-1] - stations.translation[0]) / (x[-1] - x[0])
     shapes = stations.rotation - np.stack([stations.rotation[0, 0], -chord[2], chord[1]])  # (k, 3, n)
-    return Rotations(*(_largest(p, shapes[:, [k]]) for k in range(3)))
+    squares = sum(_largest(p, shapes[:, [k]]) ** 2 for k in range(3))
+    of_deflections = squares / 3 / (1 - stiffness_change) ** 2
+    displacement = largest_displacement(link, p)
+    return Missing(min(of_deflections * displacement, shortening / 2), min(1.0, of_deflections))
 
 
 def largest_displacement(link: ModalBody, p: Array) -> float:
@@ -247,7 +237,6 @@ class Bending:
     length: float  # m, of the link
     is_stiffened: bool  # whether geometric stiffening is in the equations
     missing: Missing  # errors as `second_order` estimates them
-    rotations: Rotations  # largest rotations of sections
     pieces: int = 1  # into how many it is divided; the values are then those of its worst piece
     is_divisible: bool = False  # whether the scene lets it be divided
     buckling: float = 0.0  # how many times the loads under which the link buckles are reached, from 1 on
@@ -317,8 +306,8 @@ def link_bending(run: Run, links: Mapping[str, ModalBody]) -> dict[str, Bending]
 
 def _bending_of(run: Run, name: str, link: ModalBody, sizes: Mapping[str, Array]) -> Bending:
     """Of one link under loads of `sizes` (T,) by the names of `fe_models.modal_body.unit_loads`."""
-    body, T = node_of(run, name).body, node_of(run, name).body.modal_transform
-    own = run.q[:, node_of(run, name).p_q]
+    node = node_of(run, name)
+    body, T, own = node.body, node.body.modal_transform, run.q[:, node.p_q]
     p, force = own @ T.T, np.zeros(len(own))
     for point in body.points:
         parts = [sizes[load] for axis in "xyz" if (load := f"force/{point}/{axis}") in sizes]
@@ -326,16 +315,14 @@ def _bending_of(run: Run, name: str, link: ModalBody, sizes: Mapping[str, Array]
     deflection, rotation, shortening = shape_from_chord(link, p)
     peaks = (deflection / link.length, rotation, shortening, force * shortening)
     w, phi, s, moment = (float(x.max(initial=0.0)) for x in peaks)
-    change, buckling, missing, rotations = 0.0, 0.0, Missing(0.0, 0.0), largest_rotations(link, p)
+    change, buckling, missing = 0.0, 0.0, Missing(0.0, 0.0)
     if body.n_modes:
-        on_modes = lasting(_on_modes(link, run, name, sizes), run.time)
+        on_modes = lasting(_on_modes(link, run, node, sizes), run.time)
         change, buckling = stiffness_change(on_modes)
         if body.stiffening is not None:
-            displacement = largest_displacement(link, p)
-            missing = missing_to_second_order(displacement, s / link.length, rotations, change)
+            missing = missing_to_second_order(link, p, s / link.length, change)
         else:
-            stations, places = link.stations.translation @ T, link.stations.position
-            missing = missing_to_first_order(on_modes, own, stations, places, link.length, is_at_rest=run.is_at_rest)
+            missing = missing_to_first_order(link, T, own, on_modes, is_at_rest=run.is_at_rest)
     return Bending(
         deflection=w,
         rotation=phi,
@@ -345,14 +332,12 @@ def _bending_of(run: Run, name: str, link: ModalBody, sizes: Mapping[str, Array]
         length=link.length,
         is_stiffened=body.stiffening is not None,
         missing=missing,
-        rotations=rotations,
         buckling=buckling,
     )
 
 
-def _on_modes(link: ModalBody, run: Run, name: str, sizes: Mapping[str, Array]) -> ModalLoads:
+def _on_modes(link: ModalBody, run: Run, node: Node, sizes: Mapping[str, Array]) -> ModalLoads:
     """Loads of `sizes` (T,) of which the file has a geometric stiffness, whether it is in the equations or not."""
-    node = node_of(run, name)
     T, n = node.body.modal_transform, len(node.body.stiffness)
     K = {load: T.T @ of_load @ T for load, of_load in link.geometric_stiffness.items()}
     known = [load for load in sizes if load in K]

@@ -393,8 +393,7 @@ class Trajectory(MotionKeys):
     def _turns(self) -> tuple[Array, Reference] | None:
         """Orientations of a table or of poses, rotation vectors (k, 3) about their middle; and it."""
         if self.waypoints is not None and QUATERNION[0] in self.waypoints.columns:
-            table, reference = orientation_of(self.waypoints)
-            return table.values, reference
+            return orientation_of(self.waypoints)
         if not self._has_poses:
             return None
         return about_their_middle(np.array([of_rpy(*place[3:]) for place in self._places]), "place no.")
