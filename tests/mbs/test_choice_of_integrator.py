@@ -26,7 +26,7 @@ def chosen(model, **keys):
 
 
 def test_vibrations_solve_the_linearised_equations():
-    """Frequencies by the oracle's mass matrix, and by what the constraints leave free."""
+    """Frequencies and shapes by the oracle's mass matrix, and by what the constraints leave free."""
     robot = arm()
     q = undeformed_posture(robot.model).q
     modes = vibrations_of(robot.model, 0.0, q)
@@ -39,25 +39,9 @@ def test_vibrations_solve_the_linearised_equations():
     free = null_space(constraint_rows(motion)[1][0])
     squares = eigh(free.T @ K @ free, free.T @ M @ free, eigvals_only=True)
     np.testing.assert_allclose(modes.frequency, np.sqrt(squares), rtol=1e-9)
+    np.testing.assert_allclose(modes.shape.T @ M @ modes.shape, np.eye(len(squares)), atol=1e-9)
+    np.testing.assert_allclose(free.T @ (K @ modes.shape - M @ modes.shape * squares), 0.0, atol=1e-9 * squares.max())
     assert len(modes.frequency) == 6  # three modes a link; the path leaves the frames no freedom
-
-
-def test_vibrations_show_in_the_motion():
-    """A little of one mode as the initial deflection comes back after its period."""
-    path = {"name": "tip", "point": "link2.tip", "x": "1.2", "y": "1.4"}
-    robot = arm(gravity=(0.0, 0.0), trajectory=[path])
-    rest = undeformed_posture(robot.model)
-    modes = vibrations_of(robot.model, 0.0, rest.q)
-    away = 1e-7 * modes.shape[:, 0]
-    a = evaluated(robot, 0.0, rest.q + away, rest.v).outcome.a[0]
-    np.testing.assert_allclose(a, -(modes.frequency[0] ** 2) * away, atol=1e-3 * np.abs(a).max())
-
-
-def test_what_rings_is_resolved_explicitly():
-    links = arm_links(EI=300.0, modes=12, extra=2)
-    choice = chosen(arm(links), tolerance=1e-6, end=0.1, output_step=0.01)
-    assert choice.name == "dop853"
-    assert "highest excited frequency" in choice.reason
 
 
 def test_short_runs_are_not_worth_a_choice():
@@ -69,19 +53,18 @@ def test_short_runs_are_not_worth_a_choice():
     assert choice.reason == f"{omega / 4.8:.3g} steps are stable at {omega:.3g} rad/s: a short run"
 
 
-def test_stiff_links_that_do_not_ring_are_integrated_implicitly():
+def test_what_rings_is_resolved_explicitly():
+    """Stiff links that ring from the start on; from rest they do not, and damping lets steps grow: it is soon over."""
     links = arm_links(EI=300.0, modes=12, extra=2)
-    choice = chosen(arm(links, initial=AT_REST), tolerance=1e-3)
-    assert choice.name == "radau"
-    top, rings = (float(text.split()[0]) for text in choice.reason.split("frequency ")[1:])
+    ringing, at_rest = chosen(arm(links), tolerance=1e-6, end=0.1, output_step=0.01), arm(links, initial=AT_REST)
+    assert ringing.name == "dop853"
+    quiet = chosen(at_rest, tolerance=1e-3)
+    assert quiet.name == "radau"
+    top, rings = (float(text.split()[0]) for text in quiet.reason.split("frequency ")[1:])
     assert rings < 0.05 * top
-
-
-def test_damping_lets_steps_grow():
-    """The same ringing start: with strong damping it is over soon."""
-    undamped, damped = (arm_links(EI=300.0, modes=8, extra=2, damping_ratio=ratio) for ratio in (0.0, 0.3))
-    assert chosen(arm(undamped), tolerance=1e-3).name == "dop853"
-    assert chosen(arm(damped), tolerance=1e-3).name == "radau"
+    for ratio, expected in ((0.0, "dop853"), (0.3, "radau")):
+        links = arm_links(EI=300.0, modes=8, extra=2, damping_ratio=ratio)
+        assert chosen(arm(links), tolerance=1e-3).name == expected
 
 
 @pytest.fixture(scope="module")

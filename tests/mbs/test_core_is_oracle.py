@@ -31,15 +31,6 @@ def test_accelerations_multipliers_energies_and_rows(name):
     assert constraint_violation(motion).max() < 1e-11
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_many_states_of_a_general_pair(seed):
-    """Several random pairs at large deformation (p of order one) and speed."""
-    rng = np.random.default_rng(seed)
-    robot = zoo.chain(rng, 2)
-    q, v = random_tree_state(rng, robot, modal=1.0)
-    assert_solved(robot, q, 5 * v)
-
-
 @pytest.mark.parametrize("modes", [1, 2, 9, 30])
 @pytest.mark.parametrize("dense_damping", [False, True])
 def test_mode_counts_and_damping(modes, dense_damping):

@@ -138,41 +138,31 @@ def expected_of(t, x, rate, limits):
     return reached.min(), reached.max(), min(places)
 
 
-@pytest.mark.parametrize("backwards", [False, True])
-def test_both_coordinates_of_a_universal_joint(backwards):
-    system, start = universal(backwards)
-    dense = np.linspace(0.0, 1.5, 3001)
-    fine = run(system, start, dense, controls())
-    q, v = np.split(fine.states, 2, axis=1)
-    (node,) = (node for node in system.model.tree.nodes if node.joint.name == "cross")
-    x, rate = (node.joint.turned_around(of[:, node.q]) if backwards else of[:, node.q] for of in (q, v))
-    found = seen(system, run(system, start, [0.0, 1.5], controls()))
-    assert len(found) == 2
-    for number, limits in enumerate(TWO):
-        expected = expected_of(dense, x[:, number], rate[:, number], limits)
-        np.testing.assert_allclose(found["cross", number], expected, rtol=0, atol=1e-8)
-
-
-def test_beside_orientations():
+def beside_orientations():
     """A pendulum on a body that tumbles: steps are made in local coordinates about each other centre."""
-    joints = [
-        {"name": "ball", "type": "spherical", "between": ["ground", "a.top"]},
-        {
-            "name": "pin",
-            "type": "revolute",
-            "between": ["a.end", "b.top"],
-            "axis": [1.0, 0.2, 0.0],
-            "position_limit": [-0.3, 0.4],
-        },
-    ]
-    system, start = system_of(joints, ["a", "b"], {"pin": 0.2}, {"ball": [1.0, 2.0, 3.0]})
-    dense = np.linspace(0.0, 2.0, 4001)
-    fine = run(system, start, dense, controls())
-    (node,) = (node for node in system.model.tree.nodes if node.joint.name == "pin")
-    x, rate = fine.states[:, node.q.start], fine.states[:, system.model.tree.n_q + node.v.start]
+    ball = {"name": "ball", "type": "spherical", "between": ["ground", "a.top"]}
+    pin = {"name": "pin", "type": "revolute", "between": ["a.end", "b.top"], "axis": [1.0, 0.2, 0.0],
+           "position_limit": [-0.3, 0.4]}  # fmt: skip
+    return system_of([ball, pin], ["a", "b"], {"pin": 0.2}, {"ball": [1.0, 2.0, 3.0]})
+
+
+@pytest.mark.parametrize(
+    ("made", "name"),
+    [(lambda: universal(False), "cross"), (lambda: universal(True), "cross"), (beside_orientations, "pin")],
+)
+def test_what_is_seen_are_the_extremes_of_dense_outputs(made, name):
+    """Of both coordinates of a universal joint, and beside orientations."""
+    (system, start), dense = made(), np.linspace(0.0, 1.8, 3601)
+    tree = system.model.tree
+    q, v = np.split(run(system, start, dense, controls()).states, [tree.n_q], axis=1)
+    node = tree.nodes[tree.carried[name]]
+    x, rate = (node.joint.turned_around(of) if node.backwards else of for of in (q[:, node.q], v[:, node.v]))
     for method in ("dop853", "dopri5"):
-        found = seen(system, run(system, start, [0.0, 2.0], controls(method)))["pin", 0]
-        np.testing.assert_allclose(found, expected_of(dense, x, rate, (-0.3, 0.4)), rtol=0, atol=1e-8)
+        found = seen(system, run(system, start, [0.0, dense[-1]], controls(method)))
+        assert len(found) == len(node.joint.units)
+        for number, limits in enumerate(node.joint.position_limits):
+            expected = expected_of(dense, x[:, number], rate[:, number], limits)
+            np.testing.assert_allclose(found[name, number], expected, rtol=0, atol=1e-8)
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -44,16 +44,19 @@ def test_laws_that_share_parts():
         np.testing.assert_allclose(-force, 2.0 * (acceleration - gravity), rtol=0, atol=1e-11)
 
 
-def test_dependent_rows_are_found_and_left_out():
-    """The same point held twice: three of six rows are kept, motion as with three."""
-    rng = np.random.default_rng(8)
-    rows = [row(r.ConstraintKind.point, (-1, 1), (2, 1), axis) for axis in (*np.eye(3), *np.eye(3))]
+def links_held_at_a_point(rng, directions):
+    """Three links with rows of their last tip along `directions`, and a state near rest."""
+    rows = [row(r.ConstraintKind.point, (-1, 1), (2, 1), axis) for axis in directions]
     bodies, bases = three_links(rng), ground(rng, 2)
     mechanism = Mechanism(bodies, bases, np.array([0, 0, -9.81]), [x for x, _ in rows], [x for _, x in rows])
     model = mechanism.model()
-    q, v = state_near_rest(rng, mechanism, model, 0.1, 1.0)
-    kept = model.keep_independent_rows(q, v)
-    assert len(kept) == 3
+    return mechanism, model, *state_near_rest(rng, mechanism, model, 0.1, 1.0)
+
+
+def test_dependent_rows_are_found_and_left_out():
+    """The same point held twice: three of six rows are kept, motion as with three."""
+    mechanism, model, q, v = links_held_at_a_point(np.random.default_rng(8), [*np.eye(3), *np.eye(3)])
+    assert len(model.keep_independent_rows(q, v)) == 3
     a, lambda_ = model.evaluate(q, v, np.ones(6), None, None)
     mechanism.rows, mechanism.row_sides = mechanism.rows[:3], mechanism.row_sides[:3]
     expected, _ = mechanism.model().evaluate(q, v, np.ones(3), None, None)
@@ -66,13 +69,9 @@ def test_of_dependent_rows_the_largest_are_kept():
 
     Multipliers of the small row would be a million times as large.
     """
-    rng = np.random.default_rng(8)
     directions = 1e-6 * np.array([1.0, 0, 1]), np.eye(3)[0], np.eye(3)[2], 1e-9 * np.eye(3)[1]
-    rows = [row(r.ConstraintKind.point, (-1, 1), (2, 1), axis) for axis in directions]
-    bodies, bases = three_links(rng), ground(rng, 2)
-    mechanism = Mechanism(bodies, bases, np.array([0, 0, -9.81]), [x for x, _ in rows], [x for _, x in rows])
-    model = mechanism.model()
-    assert model.keep_independent_rows(*state_near_rest(rng, mechanism, model, 0.1, 1.0)) == [1, 2, 3]
+    _, model, *state = links_held_at_a_point(np.random.default_rng(8), directions)
+    assert model.keep_independent_rows(*state) == [1, 2, 3]
 
 
 LAWS = {

@@ -80,16 +80,10 @@ def check_mechanism(mechanism, rng, with_springs=True):
 
 
 @pytest.mark.parametrize("curved", [False, True], ids=["", "stiffened"])
-@pytest.mark.parametrize("seed", range(6))
-def test_trees_in_3d(seed, curved):
+@pytest.mark.parametrize(("made", "seed"), [*((random_tree, seed) for seed in range(6)), (rows_of_every_kind, 4)])
+def test_trees_and_rows_of_every_kind_in_3d(made, seed, curved):
     rng = np.random.default_rng(seed)
-    check_mechanism(random_tree(rng, curved=curved), rng)
-
-
-@pytest.mark.parametrize("curved", [False, True], ids=["", "stiffened"])
-def test_rows_of_every_kind_in_3d(curved):
-    rng = np.random.default_rng(4)
-    check_mechanism(rows_of_every_kind(rng, curved=curved), rng)
+    check_mechanism(made(rng, curved=curved), rng)
 
 
 class Geared(Body):

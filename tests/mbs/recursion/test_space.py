@@ -141,39 +141,3 @@ def test_energy_and_momentum_of_points(curved):
     np.testing.assert_allclose(found[[0, 2]], [kinetic, gravitational], rtol=1e-12)
     np.testing.assert_allclose(found[4:7], momentum, rtol=1e-11)
     np.testing.assert_allclose(found[7:], angular, rtol=1e-11)
-
-
-def test_derivatives_of_stiffened_bodies_by_differences():
-    """Dual numbers through the same equations; quaternions aside, which are turned as without stiffening."""
-    rng = np.random.default_rng(8)
-    joints = (J.revolute, J.universal, J.prismatic)
-    bodies = [
-        random_body(rng, 3, joint, curved=True, line=k == 1, parent=k - 1, parent_marker=min(k, 1))
-        for k, joint in enumerate(joints)
-    ]
-    rows = [row(r.ConstraintKind.point, (-1, 1), (2, 1), (0.6, 0.8, 0))]
-    mechanism = with_rows(rng, bodies, rows)
-    model = mechanism.model()
-    q, v = random_state(rng, mechanism, model, deflection=0.3)
-    target, force, h = np.zeros(1), rng.standard_normal(model.n_v), 1e-6
-    scene = _core.TreeScene()
-    scene.add_target(_core.TimeFunction.constant(0.0))
-    found = model.derivatives(scene, 0.0, q, v, force)
-
-    def slope(of):
-        return np.array([(of(h * e) - of(-h * e)) / (2 * h) for e in np.eye(model.n_v)]).T
-
-    def a(q, v, force):
-        return model.evaluate(q, v, target, force, None)[0]
-
-    by = {
-        "a_q": slope(lambda e: a(q + e, v, force)),
-        "a_v": slope(lambda e: a(q, v + e, force)),
-        "a_f": slope(lambda e: a(q, v, force + e)),
-        "value_q": slope(lambda e: model.measure(q + e, v)[0]),
-        "rate_q": slope(lambda e: model.measure(q + e, v)[1]),
-    }
-    for key, expected in by.items():
-        np.testing.assert_allclose(
-            getattr(found, key), expected, rtol=0, atol=2e-8 * np.abs(expected).max(), err_msg=key
-        )
