@@ -65,15 +65,14 @@ class _Assembled:
             for number, (kind, nodes) in instance.scope.solids.items():
                 cells.append((kind, [self._node(name, node, f"element {number}") for node in nodes]))
         same, remarks = self._tied()
-        blocks = [
-            (kind, in_gmsh_order(kind, same[np.array([nodes for _, nodes in run], dtype=np.int64)]))
-            for kind, run in groupby(cells, key=itemgetter(0))
-        ]
-        faces = {name: [same[piece] for piece in pieces] for name, pieces in self._faces().items()}
-        groups = {name: same[group] for name, group in self._node_sets().items()}
         remarks += self._left_out()
-        masses = tuple(self._masses())
-        return RawMesh(self.points, blocks, self._regions(), faces, groups, remarks=remarks, masses=masses)
+        groups = {name: same[group] for name, group in self._node_sets().items()}
+        raw = RawMesh(self.points, groups, regions=self._regions(), remarks=remarks, masses=[*self._masses()])
+        for kind, run in groupby(cells, key=itemgetter(0)):
+            raw.add_solids(kind, in_gmsh_order(kind, same[np.array([nodes for _, nodes in run])]), ())
+        for name, pieces in self._faces().items():
+            raw.facet_groups[name] = [same[piece] for piece in pieces]
+        return raw
 
     def _node(self, instance: str, number: int, of: str) -> int:
         try:
@@ -82,7 +81,7 @@ class _Assembled:
             where = f" of instance {instance}" if instance else ""
             raise InputError(f"{of}{where}: expected existing nodes", f"node {number}") from None
 
-    def _regions(self) -> dict[str, Integers]:
+    def _regions(self) -> dict[str, list[Integers]]:
         members: dict[str, list[int]] = {}
         for name, scope, instance, number in self._members("elsets"):
             place = self.solid.get(instance, {}).get(number)
@@ -90,7 +89,7 @@ class _Assembled:
                 members.setdefault(name, []).append(place)
             elif number not in self.scopes[instance].scope.others:
                 raise InputError(f"*ELSET {name}{scope}: expected existing elements", f"element {number}")
-        return {name: np.array(cells, dtype=np.int64) for name, cells in members.items()}
+        return {name: [np.array(cells, dtype=np.int64)] for name, cells in members.items()}
 
     def _node_sets(self) -> dict[str, Integers]:
         sets: dict[str, list[int]] = {}

@@ -17,7 +17,7 @@ from ..common.arrays import Array, Integers
 from ..common.errors import InputError, did_you_mean, quoted
 from ..common.structs import struct
 from .part_mesh import PartMesh, boundary_facets, facet_geometry, facet_keys, show
-from .records import Outlines, PartTables, PlaceRecord, RectangleSection, SolidGeometry
+from .records import PartTables, PlaceRecord, RectangleSection, SolidGeometry, SurfacePatches
 from .source import Source
 
 # A facet lies in a plane when its corners are closer to it than this, relative to the length of the link: files carry
@@ -137,8 +137,8 @@ def named_faces(source: Source, tables: PartTables) -> PartMesh:
             chosen[table.name] = _group(source, boundary, table.group, f"interface.group of {table.name}")
         elif isinstance(table.position, tuple):
             chosen[table.name] = _nearest(boundary, table)
-    if tables.outlines is not None:
-        chosen |= _patch_beds(boundary, geometry, tables.outlines)
+    if tables.patches is not None:
+        chosen |= _patch_beds(boundary, geometry, tables.patches)
     return _tagged(part, boundary, chosen)
 
 
@@ -200,21 +200,21 @@ def _nearest(boundary: PartBoundary, table: PlaceRecord) -> Integers:
     return facing[best].facets
 
 
-def _patch_beds(boundary: PartBoundary, geometry: SolidGeometry, outlines: Outlines) -> dict[str, Integers]:
+def _patch_beds(boundary: PartBoundary, geometry: SolidGeometry, patches: SurfacePatches) -> dict[str, Integers]:
     """The facets under each patch, whose area is that of the patch."""
     assert isinstance(geometry.section, RectangleSection)
     slack = IN_PLANE * geometry.length
     corners = boundary.points[boundary.facets]
-    across = np.all(np.abs(corners[..., 2]) <= outlines.width / 2 + slack, axis=1)
+    across = np.all(np.abs(corners[..., 2]) <= patches.width / 2 + slack, axis=1)
     beds: dict[str, Integers] = {}
     for name, y in (("top", geometry.section.height / 2), ("bottom", -geometry.section.height / 2)):
-        if outlines.faces not in (name, "both"):
+        if patches.faces not in (name, "both"):
             continue
         level = across & np.all(np.abs(corners[..., 1] - y) <= slack, axis=1)
-        for k, (begin, end) in enumerate(outlines.edges):
+        for k, (begin, end) in enumerate(patches.edges(geometry.length)):
             along = np.all((corners[..., 0] >= begin - slack) & (corners[..., 0] <= end + slack), axis=1)
             bed = np.flatnonzero(level & along)
-            area, expected = boundary.area[bed].sum(), (end - begin) * outlines.width
+            area, expected = boundary.area[bed].sum(), (end - begin) * patches.width
             if abs(area - expected) > 1e-6 * expected:
                 raise InputError(
                     f"surface_patch: expected {expected:.6g} m² of free surface under patch {k + 1} ({name})",

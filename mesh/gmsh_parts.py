@@ -22,11 +22,11 @@ from .gmsh_session import extract_mesh, gmsh_session, mesh_model, volume_and_sur
 from .part_mesh import show
 from .part_reader import MESHING, MESHING_CELL, allow
 from .records import (
-    Outlines,
     PartTables,
     RectangleSection,
     SolidGeometry,
     SolidMeshRecord,
+    SurfacePatches,
     default_order,
     default_size,
     extents,
@@ -163,15 +163,15 @@ def mesh_shape(tables: PartTables) -> Source:
     Raises `InputError` where the shape cannot be meshed.
     """
     unit = 10.0 ** round(log10(tables.geometry.length))
-    geometry, outlines = _in(unit, tables.geometry), tables.outlines and _in(unit, tables.outlines)
+    geometry = _in(unit, tables.geometry)
     with gmsh_session():
         body = _body(geometry)
         for hole in geometry.hole:
             reach = max(extents(geometry.section))
             across = hole.position, hole.offset, -reach, 0, 0, 2 * reach, hole.diameter / 2
             body, _ = gmsh.model.occ.cut(body, [(3, gmsh.model.occ.addCylinder(*across))])
-        if outlines is not None:
-            _outline(body, geometry, outlines)
+        if tables.patches is not None:
+            _outline(body, geometry, _in(unit, tables.patches))
         gmsh.model.occ.synchronize()
         volume, surface = volume_and_surface()
         order = tables.mesh.order or default_order("tetrahedron")
@@ -191,8 +191,6 @@ def _in(unit: float, lengths: Lengths) -> Lengths:
         converted = tuple(_in(unit, item) for item in lengths)
     elif isinstance(lengths, Record):
         converted = lengths.model_copy(update={name: _in(unit, value) for name, value in lengths})
-    elif isinstance(lengths, Outlines):
-        converted = replace(lengths, edges=_in(unit, lengths.edges), width=_in(unit, lengths.width))
     return cast(Lengths, converted)
 
 
@@ -223,16 +221,16 @@ def _wire(x: float, section: RectangleSection) -> int:
     return int(occ.addWire(lines))
 
 
-def _outline(body: DimTags, geometry: SolidGeometry, outlines: Outlines) -> None:
+def _outline(body: DimTags, geometry: SolidGeometry, patches: SurfacePatches) -> None:
     """Press the outlined rectangles into the faces at largest and smallest y."""
     assert isinstance(geometry.section, RectangleSection)
     half = geometry.section.height / 2
-    sides = {"top": [half], "bottom": [-half], "both": [half, -half]}[outlines.faces]
+    sides = {"top": [half], "bottom": [-half], "both": [half, -half]}[patches.faces]
     rectangles: DimTags = []
-    for begin, end in outlines.edges:
+    for begin, end in patches.edges(geometry.length):
         begin, end = max(begin, 0.0), min(end, geometry.length)
         for y in sides:
-            face = gmsh.model.occ.addRectangle(begin, -outlines.width / 2, 0, end - begin, outlines.width)
+            face = gmsh.model.occ.addRectangle(begin, -patches.width / 2, 0, end - begin, patches.width)
             gmsh.model.occ.rotate([(2, face)], *_ORIGIN, *(1, 0, 0), 1.5707963267948966)
             gmsh.model.occ.translate([(2, face)], 0, y, 0)
             rectangles.append((2, face))

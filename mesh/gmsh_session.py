@@ -20,7 +20,7 @@ import numpy as np
 from ..common.errors import InputError, is_own_fault
 from .cells import SLIVER, VOLUME_ELEMENTS, cell_quality
 from .records import CIRCLE, GROWTH
-from .source import MeshBlocks, RawMesh
+from .source import RawMesh
 
 _MOST_PRINTED = 1 << 20  # bytes
 # gmsh's newer algorithm, HXT, makes better meshes faster, but other ones in every run.
@@ -141,7 +141,8 @@ def own_entities(dim: int = -1) -> list[tuple[int, int]]:
 
 def extract_mesh() -> RawMesh:
     """The model's volume elements, with the names of its physical groups; of all volumes where no group has any."""
-    blocks, (tags, coordinates, _) = MeshBlocks(), gmsh.model.mesh.getNodes()
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    mesh = RawMesh(np.reshape(coordinates, (-1, 3)))
     number = np.full(int(tags.max(initial=0)) + 1, -1, dtype=np.int64)
     number[tags.astype(np.int64)] = np.arange(len(tags))
     for dim, entity in [*own_entities(3), *gmsh.model.getEntities(2), *gmsh.model.getEntities(1)]:
@@ -152,9 +153,9 @@ def extract_mesh() -> RawMesh:
             groups = [(name, np.arange(len(cells))) for name in names]
             corners = cells[:, : gmsh.model.mesh.getElementProperties(kind)[5]]
             if dim == 3:
-                blocks.add_solids(VOLUME_ELEMENTS.get(int(kind), f"gmsh type {kind}"), cells, groups)
+                mesh.add_solids(VOLUME_ELEMENTS.get(int(kind), f"gmsh type {kind}"), cells, groups)
             elif dim == 2:
-                blocks.add_surfaces(corners, groups)
+                mesh.add_surfaces(corners, groups)
             else:
-                blocks.lines.append(corners)
-    return blocks.mesh(np.asarray(coordinates, dtype=np.float64).reshape(-1, 3), {})
+                mesh.lines.append(corners)
+    return mesh

@@ -6,12 +6,12 @@ An entry is named by the content of the keys that define the mesh, the part's fi
 from __future__ import annotations
 
 import hashlib
+import json
 import zipfile
 from contextlib import suppress
-from dataclasses import asdict
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,15 +19,13 @@ from ..common.cache import cache_folder, is_own
 from ..common.errors import SolveError
 from ..common.files import write_atomically
 from ..common.version import digest_of_code, digest_of_content
-from .cells import CELLS, CellName
 from .included import files_of
 from .records import PartTables, PlaceRecord, SolidGeometry
 
 if TYPE_CHECKING:
     from .part_mesh import PartMesh
 
-_ARRAYS = ("points", "cells", "cell_tag", "facets", "facet_tag")
-_NAMES = ("regions", "faces")
+_REST = "rest"  # of a mesh, beside its arrays: as JSON
 _OF_PLACES = set(PlaceRecord.model_fields)  # what else a record of an interface holds has no influence on the mesh
 
 
@@ -56,7 +54,7 @@ def kept_path(tables: PartTables) -> Path:
         "suffix": file.suffix.lower() if file is not None else "",
         "mesh": tables.mesh.model_dump(mode="json"),
         "interfaces": [item.model_dump(mode="json", include=_OF_PLACES) for item in tables.places],
-        "outlines": asdict(tables.outlines) if tables.outlines else None,
+        "patches": tables.patches and tables.patches.model_dump(mode="json"),
     }
     return cache_folder("meshes") / f"{digest_of_content(content)}.npz"
 
@@ -69,32 +67,17 @@ def kept_part(path: Path) -> PartMesh | None:
         return None
     try:
         with np.load(path, allow_pickle=False) as file:
-            if str(file["cell"]) not in CELLS:
-                return None
-            names = {key: dict(zip(map(str, file[key]), map(int, file[f"{key}_tag"]), strict=True)) for key in _NAMES}
-            return PartMesh(
-                cell=cast(CellName, str(file["cell"])),
-                degree=int(file["degree"]),
-                regions=names["regions"],
-                faces=names["faces"],
-                remarks=tuple(map(str, file["remarks"])),
-                **{key: file[key] for key in _ARRAYS},
-            )
+            arrays = dict(file)
+            return PartMesh(**json.loads(str(arrays.pop(_REST))), **arrays)
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None
 
 
 def keep_part(path: Path, part: PartMesh) -> None:
     """Keep a mesh at `path`; a cache that cannot be written does no harm."""
-    arrays: dict[str, Any] = {key: getattr(part, key) for key in _ARRAYS} | {"cell": part.cell, "degree": part.degree}
-    for key in _NAMES:
-        tags = getattr(part, key)
-        arrays |= {
-            key: np.array(list(tags), dtype=np.str_),
-            f"{key}_tag": np.array(list(tags.values()), dtype=np.int32),
-        }
-    arrays["remarks"] = np.array(part.remarks, dtype=np.str_)
+    arrays = {name: value for name, value in vars(part).items() if isinstance(value, np.ndarray)}
+    rest = {name: value for name, value in vars(part).items() if name not in arrays}
     image = BytesIO()
-    np.savez(image, **arrays)
+    np.savez(image, **arrays, **{_REST: json.dumps(rest)})
     with suppress(SolveError):
         write_atomically(path, image.getvalue(), "mesh", ours=True, private=True)

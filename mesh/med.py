@@ -6,7 +6,7 @@ Cartesian ones. See "MED file format" in the documentation of MED 4.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ import numpy as np
 from ..common.arrays import Integers
 from ..common.errors import InputError, blaming_file
 from .cells import in_gmsh_order
-from .source import MeshBlocks, RawMesh
+from .source import RawMesh
 
 # Types of cells with their nodes.
 _SOLIDS = {
@@ -63,7 +63,8 @@ def _mesh(file: h5py.File) -> RawMesh:
     step = mesh if "NOE" in mesh else _only(mesh, "step of the mesh")[1]
     points = _columns(step["NOE/COO"], 3).astype(np.float64)
     families = file["FAS"][name] if name in file.get("FAS", ()) else {}
-    blocks, polygons = MeshBlocks(), False
+    of_nodes = _members(step["NOE"], _groups(families.get("NOEUD", {})), len(points))
+    raw = RawMesh(points, dict(of_nodes), remarks=[*_remarks(attributes, step["MAI"])])
     groups = _groups(families.get("ELEME", {}))
     for kind, of in step["MAI"].items():
         if _text(of.attrs, "PFL") not in ("", _WHOLE):
@@ -71,19 +72,16 @@ def _mesh(file: h5py.File) -> RawMesh:
         if kind in _SOLIDS:
             width, name = _SOLIDS[kind]
             cells = in_gmsh_order(name, _cells(of, width), _AS_VTK)
-            blocks.add_solids(name, cells, _members(of, groups, len(cells)))
+            raw.add_solids(name, cells, _members(of, groups, len(cells)))
         elif kind in _SURFACES:
             width, corners = _SURFACES[kind]
             cells = _cells(of, width)[:, :corners]
-            blocks.add_surfaces(cells, _members(of, groups, len(cells)))
+            raw.add_surfaces(cells, _members(of, groups, len(cells)))
         elif kind in _LINES:
-            blocks.lines.append(_cells(of, _LINES[kind])[:, :2])
-        elif kind.startswith("POG"):
-            polygons = True
-        elif kind != "PO1":  # points
+            raw.lines.append(_cells(of, _LINES[kind])[:, :2])
+        elif kind != "PO1" and not kind.startswith("POG"):  # points, polygons
             raise InputError(f"expected cells of {', '.join(_SOLIDS)}", f"{kind} (polyhedra, or structure elements)")
-    nodes = _members(step["NOE"], _groups(families.get("NOEUD", {})), len(points))
-    return blocks.mesh(points, dict(nodes), _remarks(attributes, polygons))
+    return raw
 
 
 def _only(parent: h5py.Group, what: str) -> tuple[str, Any]:
@@ -122,8 +120,8 @@ def _members(of: h5py.Group, groups: Mapping[int, list[str]], count: int) -> Ite
         yield name, np.flatnonzero(np.isin(family, [number for number in present if name in groups.get(number, ())]))
 
 
-def _remarks(attributes: Mapping[str, Any], polygons: bool) -> Iterator[str]:
-    if polygons:
+def _remarks(attributes: Mapping[str, Any], kinds: Iterable[str]) -> Iterator[str]:
+    if any(kind.startswith("POG") for kind in kinds):
         yield "polygons (shells?) are left out"
     if unit := _text(attributes, "UNI")[:16].strip():
         yield f"the file says that its unit is {unit}: `unit` in the link file counts"

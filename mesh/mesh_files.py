@@ -20,7 +20,7 @@ from ..common.errors import InputError, blaming_file
 from ..common.libraries import missing
 from .cells import in_gmsh_order
 from .part_reader import read_apart
-from .source import MeshBlocks, RawMesh
+from .source import RawMesh
 
 if TYPE_CHECKING:
     import meshio
@@ -145,21 +145,21 @@ def _raw_mesh(mesh: meshio.Mesh) -> RawMesh:
     _check_ghosts(mesh.cell_data)
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points
-    blocks = MeshBlocks()
+    sets = mesh.point_sets or {}
+    raw = RawMesh(points, {name: np.asarray(group, dtype=np.int64) for name, group in sets.items()})
     for block, groups in zip(mesh.cells, _groups(mesh), strict=True):
         cells = np.asarray(block.data, dtype=np.int64)
         if other := _OTHERS.fullmatch(block.type):
             if other[1] == "line":
-                blocks.lines.append(cells[:, :2])
+                raw.lines.append(cells[:, :2])
             elif other[1] != "vertex":
-                blocks.add_surfaces(cells[:, : _CORNERS[other[1]]], groups.items())
+                raw.add_surfaces(cells[:, : _CORNERS[other[1]]], groups.items())
         else:  # of unknown types, too: these are rejected by name
             kind = "hexahedron" if block.type == "voxel" else block.type
             kind = _LAGRANGE.get((kind, cells.shape[1]), kind)
             cells = cells[:, _VOXEL] if block.type == "voxel" else in_gmsh_order(kind, cells)
-            blocks.add_solids(kind, cells, groups.items())
-    sets = mesh.point_sets or {}
-    return blocks.mesh(points, {name: np.asarray(group, dtype=np.int64) for name, group in sets.items()})
+            raw.add_solids(kind, cells, groups.items())
+    return raw
 
 
 def _groups(mesh: meshio.Mesh) -> Iterator[Mapping[str, Integers]]:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..common.arrays import Array, Integers
+from ..common.arrays import Array
 from ..common.errors import InputError
 from .cells import in_gmsh_order
 from .frames import GLOBAL, Frame, Kind
@@ -249,24 +249,25 @@ class _Deck:
         if not self.grids and not self.solids:
             raise InputError("expected GRID and CTETRA or CHEXA cards", "none")
         place = {number: k for k, number in enumerate(self.grids)}
-        cells: dict[str, list[list[int]]] = {}
-        properties: dict[str, list[int]] = {}
+        of_kind: dict[str, list[tuple[list[int], int]]] = {}
         for card in self.solids.values():
             kind, nodes = _nodes(card)
-            cells.setdefault(kind, []).append([self._place(place, node, card) for node in nodes])
-            properties.setdefault(kind, []).append(card.whole(1, card.whole(0)))
-        blocks = [(kind, in_gmsh_order(kind, np.array(rows), _AS_VTK)) for kind, rows in cells.items()]
-        owner = np.array([number for of in properties.values() for number in of], dtype=np.int64)
-        regions = {str(number): np.flatnonzero(owner == number) for number in np.unique(owner).tolist()}
-        faces: dict[str, list[Integers]] = {}
+            row = [self._place(place, node, card) for node in nodes], card.whole(1, card.whole(0))
+            of_kind.setdefault(kind, []).append(row)
+        raw = RawMesh(
+            self._points(list(self.grids.values())),
+            remarks=[*left_out(self.others, [name for name, count in self.not_read.items() if count])],
+            masses=[*map(self._mass, self.masses)],
+        )
+        for kind, rows in of_kind.items():
+            owner = np.array([number for _, number in rows])
+            groups = [(str(number), np.flatnonzero(owner == number)) for number in np.unique(owner).tolist()]
+            raw.add_solids(kind, in_gmsh_order(kind, np.array([nodes for nodes, _ in rows]), _AS_VTK), groups)
         for card in self.shells.values():
             corners = [self._place(place, card.whole(2 + k), card) for k in range(_SHELLS[card.name])]
-            faces.setdefault(str(card.whole(1, card.whole(0))), []).append(np.array([corners], dtype=np.int64))
-        masses = tuple(map(self._mass, self.masses))
-        remarks = [*left_out(self.others, [name for name, count in self.not_read.items() if count])]
-        return RawMesh(
-            self._points(list(self.grids.values())), blocks, regions, faces, {}, remarks=remarks, masses=masses
-        )
+            name = str(card.whole(1, card.whole(0)))
+            raw.facet_groups.setdefault(name, []).append(np.array([corners], dtype=np.int64))
+        return raw
 
     def _mass(self, card: Card) -> PointMass:
         """Of CONM1 or CONM2, whose offset is in rectangular axes; with CID = -1 it is the place in the basic ones."""

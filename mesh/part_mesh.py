@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 
 import numpy as np
@@ -41,8 +41,8 @@ class PartMesh:
     facets: Integers = field(default_factory=lambda: np.empty((0, 3), dtype=np.int64))
     facet_tag: Tags = field(default_factory=lambda: np.empty(0, dtype=np.int32))
     faces: Mapping[str, int] = field(default_factory=dict)
-    overlaps: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
-    remarks: tuple[str, ...] = ()
+    overlaps: Mapping[str, Sequence[int]] = field(default_factory=dict)
+    remarks: Sequence[str] = ()
 
     @property
     def shape(self) -> Cell:

@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ..common.keys import Name, NotNegative, Positive, Title, Vector3
+from ..common.keys import MOST_PATCHES, Name, NotNegative, PatchCount, Positive, Title, Vector3
 from ..common.structs import struct
 from ..common.validation import InputFile, Record
 from .cells import CellName
@@ -180,13 +180,29 @@ class PlaceRecord(Record):
     """Physical surface group of the mesh file with the face (solids)."""
 
 
-@struct
-class Outlines:
-    """Rectangles to outline in the mesh of a solid, on the faces at its largest or smallest y, about z = 0."""
+class SurfacePatches(Record):
+    """Piezoelectric patches outlined in the mesh of a solid, on the faces at its largest or smallest y.
 
-    edges: tuple[tuple[float, float], ...]  # begin and end of each along x, m from the root
-    width: float  # of all along z, m
-    faces: Literal["top", "bottom", "both"] = "both"  # "top" at the largest y, "bottom" at the smallest
+    Same meaning of the keys as in a scene's `[[pzt]]`: centers at (k − ½)·length of link / count, or `centers`.
+    """
+
+    count: PatchCount | None = None
+    """Number of patches, evenly spaced; alternative: `centers`."""
+    # m from the root
+    centers: Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_PATCHES)] | None = None
+    """Centers, m from the root."""
+    length: Positive
+    """Length of a patch along x, m."""
+    width: Positive
+    """Width of a patch along z, m."""
+    faces: Literal["top", "bottom", "both"] = "both"
+    """Faces with patches: at the largest y, the smallest y, or both."""
+
+    def edges(self, length: float) -> list[tuple[float, float]]:
+        """Begin and end of each patch on a link of `length`, m from the root."""
+        count = self.count or 1
+        centers = self.centers or [(k + 0.5) * length / count for k in range(count)]
+        return [(center - self.length / 2, center + self.length / 2) for center in centers]
 
 
 @struct
@@ -197,7 +213,7 @@ class PartTables:
     geometry: SolidGeometry
     mesh: SolidMeshRecord = SolidMeshRecord.model_construct()
     places: Sequence[PlaceRecord] = ()  # tables `interface`
-    outlines: Outlines | None = None  # of patches, in the mesh
+    patches: SurfacePatches | None = None  # to outline in the mesh
 
 
 # Elements along a full circle of a curved face, and along that of a solid bar: there, where a cell has two edges on the

@@ -3,8 +3,8 @@
 Names of element types are meshio's; nodes are in gmsh's order.
 """
 
-from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import field
 
 import numpy as np
 
@@ -42,52 +42,38 @@ class PointMass:
     point: Array
 
 
-@struct
-class RawMesh:
-    """Mesh as read from a source, in its unit of length."""
-
-    points: Array  # (p, 3) in the source's unit and axes; some may belong to no volume
-    blocks: Sequence[tuple[str, Integers]]  # of volume elements: type, (c, v) points
-    # name → (k,) elements, counted through all `blocks`; an element may belong to several
-    regions: Mapping[str, Integers]
-    facet_groups: Mapping[str, Sequence[Integers]]  # name → facets, as arrays (k, ≥ 3) of corners
-    point_groups: Mapping[str, Integers]  # name → (k,) points: a face is what has all its corners among them
-    surfaces: Sequence[Integers] = ()  # corners of all triangles and quadrilaterals, as arrays (k, 3 or 4)
-    lines: Sequence[Integers] = ()  # ends of all elements that are lines, as arrays (k, 2)
-    remarks: Sequence[str] = ()  # what the file holds and the link does not, a sentence each
-    masses: Sequence[PointMass] = ()  # concentrated ones, which the link does not have either
-
-
 Groups = Iterable[tuple[str, Integers]]
 """Names with their members (k,) in a block of elements."""
 
 
-class MeshBlocks:
-    """A `RawMesh` in the making, block by block of elements, as files have them."""
+@struct
+class RawMesh:
+    """Mesh as read from a source, in its unit of length; readers add elements block by block."""
 
-    def __init__(self) -> None:
-        self.blocks, self.count = list[tuple[str, Integers]](), 0
-        self.regions, self.facets = (defaultdict[str, list[Integers]](list) for _ in range(2))
-        self.surfaces, self.lines = list[Integers](), list[Integers]()
+    points: Array  # (p, 3) in the source's unit and axes; some may belong to no volume
+    # name → (k,) points: a face is what has all its corners among them
+    point_groups: Mapping[str, Integers] = field(default_factory=dict)
+    blocks: list[tuple[str, Integers]] = field(default_factory=list)  # of volume elements: type, (c, v) points
+    # name → arrays (k,) of elements, counted through all `blocks`; an element may belong to several
+    regions: dict[str, list[Integers]] = field(default_factory=dict)
+    facet_groups: dict[str, list[Integers]] = field(default_factory=dict)  # name → arrays (k, ≥ 3) of corners
+    surfaces: list[Integers] = field(default_factory=list)  # corners of all triangles and quadrilaterals (k, 3 or 4)
+    lines: list[Integers] = field(default_factory=list)  # ends (k, 2) of all elements that are lines
+    remarks: Sequence[str] = ()  # what the file holds and the link does not, a sentence each
+    masses: Sequence[PointMass] = ()  # concentrated ones, which the link does not have either
 
     def add_solids(self, kind: str, cells: Integers, groups: Groups) -> None:
         """Volume elements (c, v) in gmsh's order of nodes."""
+        count = sum(len(block) for _, block in self.blocks)
         self.blocks.append((kind, cells))
         for name, members in groups:
-            self.regions[name].append(self.count + members)
-        self.count += len(cells)
+            self.regions.setdefault(name, []).append(count + members)
 
     def add_surfaces(self, corners: Integers, groups: Groups) -> None:
         """Add triangles or quadrilaterals (k, 3 or 4)."""
         self.surfaces.append(corners)
         for name, members in groups:
-            self.facets[name].append(corners[members])
-
-    def mesh(self, points: Array, point_groups: Mapping[str, Integers], remarks: Iterable[str] = ()) -> RawMesh:
-        """Make the mesh of the collected elements on points (p, 3), lengths as in the file."""
-        regions = {name: np.concatenate(members) for name, members in self.regions.items()}
-        groups = regions, self.facets, point_groups
-        return RawMesh(points, self.blocks, *groups, self.surfaces, self.lines, tuple(remarks))
+            self.facet_groups.setdefault(name, []).append(corners[members])
 
 
 def left_out(others: Mapping[str, int], unread: Collection[str]) -> Iterator[str]:
@@ -123,7 +109,8 @@ def source_from(raw: RawMesh) -> Source:
     kept = np.sort(first)  # each cell once, in the file's order
     once = np.searchsorted(kept, first)[like.reshape(-1)]
     cells = cells[kept]
-    regions = {name: np.unique(once[members]) for name, members in raw.regions.items() if members.size}
+    members = {name: np.concatenate(of) for name, of in raw.regions.items()}
+    regions = {name: np.unique(once[of]) for name, of in members.items() if of.size}
     cell_tag, tags = _tags(len(cells), regions)
     straight = degree == 2 and _is_straight(raw.points, cells, cell)
     if kind == "hexahedron20" and not straight:
@@ -194,7 +181,7 @@ def _left_out(raw: RawMesh, cells: Integers, cell: CellName) -> Iterator[str]:
         yield f"{loose} triangles or quadrilaterals that are no side of a volume element (shells?) are left out"
     if raw.lines:
         edges = np.sort(cells[:, shape.edges].reshape(-1, 2), axis=1) @ np.array([count, 1])
-        lines = np.sort(np.concatenate(list(raw.lines)), axis=1) @ np.array([count, 1])
+        lines = np.sort(np.concatenate(raw.lines), axis=1) @ np.array([count, 1])
         if loose := int(np.sum(~np.isin(lines, edges))):
             yield f"{loose} lines that are no edge of a volume element (beams?) are left out"
 

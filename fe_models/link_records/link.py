@@ -6,18 +6,18 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from ...common.keys import MOST_MODES, MOST_PATCHES, ModeCount, Name, NotNegative, PatchCount, Positive, Title, Vector3
+from ...common.keys import MOST_MODES, ModeCount, Name, NotNegative, Positive, Title, Vector3
 from ...common.validation import Record
 from ...mesh.records import (
     BeamGeometry,
     BeamMesh,
-    Outlines,
     PartTables,
     PlaceRecord,
     RectangleSection,
     SectionRecord,
     SolidGeometry,
     SolidMeshRecord,
+    SurfacePatches,
 )
 from .families import FAMILIES, HOLDING_ROOT, Family
 from .measured import Measured
@@ -37,35 +37,6 @@ class InterfaceRecord(PlaceRecord):
     """Point mass at the interface, kg."""
     inertia: tuple[NotNegative, NotNegative, NotNegative] = (0.0, 0.0, 0.0)
     """Moments of inertia of that mass about x, y, z through the interface, kg·m²."""
-
-
-class SurfacePatches(Record):
-    """Piezoelectric patches outlined in the mesh of a solid, on the faces at its largest or smallest y.
-
-    Same meaning of the keys as in a scene's `[[pzt]]`: centers at (k − ½)·length of link / count, or `centers`.
-    """
-
-    count: PatchCount | None = None
-    """Number of patches, evenly spaced; alternative: `centers`."""
-    # m from the root
-    centers: Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_PATCHES)] | None = None
-    """Centers, m from the root."""
-    length: Positive
-    """Length of a patch along x, m."""
-    width: Positive
-    """Width of a patch along z, m."""
-    faces: Literal["top", "bottom", "both"] = "both"
-    """Faces with patches: at the largest y, the smallest y, or both."""
-
-    def edges(self, length: float) -> list[tuple[float, float]]:
-        """Begin and end of each patch on a link of `length`, m from the root."""
-        count = self.count or 1
-        centers = self.centers or [(k + 0.5) * length / count for k in range(count)]
-        return [(center - self.length / 2, center + self.length / 2) for center in centers]
-
-    def outlines(self, length: float) -> Outlines:
-        """Return the outlines of the patches in the mesh of a solid of `length` (m)."""
-        return Outlines(tuple(self.edges(length)), self.width, self.faces)
 
 
 Poisson = Annotated[float, Field(gt=-1, lt=0.5)]
@@ -285,8 +256,7 @@ class SolidLink(_Link):
 
     def part(self, path: Path) -> PartTables:
         """Return the tables that determine the mesh; `path` is the link file."""
-        outlines = self.surface_patch.outlines(self.geometry.length) if self.surface_patch else None
-        return PartTables(path, self.geometry, self.mesh, self.interface, outlines)
+        return PartTables(path, self.geometry, self.mesh, self.interface, self.surface_patch)
 
     @property
     def couplings(self) -> dict[str, Coupling]:

@@ -21,9 +21,9 @@ from ...common.arrays import Array
 from ...common.errors import SolveError
 from ...common.structs import struct
 from ...mesh.compat import compiled_form, function_space, lagrange_element, node_map
+from ...mesh.records import SurfacePatches
 from ...mesh.slices import section_quadratures
 from ...mesh.solid_mesh import MeshTags
-from ..link_records.link import SurfacePatches
 from ..modal_body import OutlinedPatches
 from ..modal_body.parts import LEVI_CIVITA
 from .elasticity import SolidModel

@@ -6,8 +6,9 @@ import numpy as np
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
-from ffrobot.fe_models.link_records.link import Material, SurfacePatches
+from ffrobot.fe_models.link_records.link import Material
 from ffrobot.fe_models.solid.constitutive import stiffness
+from ffrobot.mesh.records import SurfacePatches
 
 E, NU = 2.0e11, 0.3
 C = stiffness(Material(youngs_modulus=E, poissons_ratio=NU, density=7850.0))

@@ -29,9 +29,9 @@ def solid():
 def mesh_part():
     """The part that the tables of a link file describe."""
 
-    def make(geometry, interfaces=(), outlines=None, said=None, **mesh):
+    def make(geometry, interfaces=(), patches=None, said=None, **mesh):
         tell = said.append if said is not None else lambda _: None
-        return part_mesh(PartTables(LINK, geometry, SolidMeshRecord(**mesh), interfaces, outlines), tell)
+        return part_mesh(PartTables(LINK, geometry, SolidMeshRecord(**mesh), interfaces, patches), tell)
 
     return make
 

@@ -6,7 +6,7 @@ from solid_parts import face_area, rectangle
 
 from ffrobot.common.errors import InputError
 from ffrobot.mesh.faces import PartBoundary
-from ffrobot.mesh.records import CircleSection, Hole, Outlines, PlaceRecord
+from ffrobot.mesh.records import CircleSection, Hole, PlaceRecord, SurfacePatches
 
 
 def fork(occ):
@@ -92,12 +92,9 @@ def test_faces_equally_near_are_refused(solid, mesh_part):
 def test_two_names_may_share_a_face_but_not_a_part_of_it(solid, mesh_part):
     part = mesh_part(solid(), (at("grip", (1.0, 0.0, 0.0), (1.0, 0.0, 0.0)),))
     assert part.faces["grip"] == part.faces["tip"]
+    patches = SurfacePatches(centers=(0.25, 0.75), length=0.1, width=0.02)
     with pytest.raises(InputError, match=r'interface patch/0/top: expected faces that do not overlap.*"grip"'):
-        mesh_part(
-            solid(),
-            (at("grip", (0.5, 0.0075, 0.0), (0.0, 1.0, 0.0)),),
-            Outlines(((0.2, 0.3), (0.7, 0.8)), 0.02),
-        )
+        mesh_part(solid(), (at("grip", (0.5, 0.0075, 0.0), (0.0, 1.0, 0.0)),), patches)
 
 
 def test_a_table_may_only_add_to_root_and_tip(solid, mesh_part):

@@ -8,7 +8,7 @@ import pytest
 from solid_parts import face_area, integrate, rectangle
 
 from ffrobot.common.errors import InputError
-from ffrobot.mesh.records import CircleSection, Hole, Outlines, TubeSection
+from ffrobot.mesh.records import CircleSection, Hole, SurfacePatches, TubeSection
 from ffrobot.mesh.structured import graded_nodes, with_points
 
 CELLS = ("tetrahedron", "hexahedron")
@@ -88,12 +88,12 @@ def test_holes_are_cut_out(solid, mesh_part):
 
 @pytest.mark.parametrize("faces", ["top", "bottom", "both"])
 def test_patches_lie_on_whole_facets(solid, mesh_part, faces):
-    outlines = Outlines(tuple((x - 0.025, x + 0.025) for x in (0.125, 0.375, 0.625, 0.875)), 0.02, faces)
-    part = mesh_part(solid(), outlines=outlines)
+    patches = SurfacePatches(count=4, length=0.05, width=0.02, faces=faces)
+    part = mesh_part(solid(), patches=patches)
     sides = ("top", "bottom") if faces == "both" else (faces,)
     assert set(part.faces) == {"root", "tip", *(f"patch/{k}/{side}" for k in range(4) for side in sides)}
     for side in sides:
-        for k, (begin, end) in enumerate(outlines.edges):
+        for k, (begin, end) in enumerate(patches.edges(1.0)):
             corners = part.points[part.facets[part.facet_tag == part.faces[f"patch/{k}/{side}"]]].reshape(-1, 3)
             assert face_area(part, f"patch/{k}/{side}") == pytest.approx(0.05 * 0.02, rel=1e-9)
             np.testing.assert_allclose(corners.min(axis=0)[[0, 2]], [begin, -0.01], atol=1e-12)
