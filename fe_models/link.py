@@ -39,6 +39,7 @@ from .link_source import LinkSource, LinkTable, link_path
 from .modal_body import ModalBody
 from .modal_body.lumped_masses import lumps
 from .modal_body.measured import as_computed, damping_ratio, with_measured
+from .modal_body.of_link import stress_loads
 from .modal_body_file import FORMAT, read_modal_body, write_modal_body
 
 Progress = Callable[[str], None]
@@ -273,13 +274,13 @@ def _digest(record: Mapping[str, Any]) -> str:
 
 def restated(body: ModalBody, link: Link) -> ModalBody | None:
     """Derive the modal body of `link` from one with the same modes; None where it lacks any requested data."""
-    body, loads = as_computed(body), body.stress_loads
+    body = as_computed(body)
     if isinstance(link, BeamLink):  # stresses follow from its stations
-        from .beam.stress import beam_stresses, stress_loads  # loads SciPy
+        from .beam.stress import beam_stresses  # loads SciPy
 
-        attached = lumps(link.interface, body.interfaces)
-        of_modes = np.diag(body.stiffness), body.family, attached, body.residual, body.interfaces
-        points, loads = beam_stresses(link, body.stations, *of_modes), stress_loads(link, body.interfaces)
+        of_modes = np.diag(body.stiffness), body.family, body.eigenmode_count
+        attached, at = lumps(link.interface, body.interfaces), body.interfaces
+        points = beam_stresses(link, body.stations, *of_modes, attached=attached, interfaces=at)
     else:  # which needs its mesh for them
         known = {tuple(point.position): point for point in body.stress.values() if point.static is not None}
         if not known.keys() >= set(link.stress.points.values()):
@@ -293,7 +294,7 @@ def restated(body: ModalBody, link: Link) -> ModalBody | None:
         damping_ratio=damping_ratio(link, np.sqrt(np.diag(body.stiffness))),
         damping_of=link.damping.of,
         stress=points,
-        stress_loads=loads if points or link.stress.surface else (),
+        stress_loads=stress_loads(link, body.interfaces),
         surface_stress=body.surface_stress if link.stress.surface else None,
         surface_static=body.surface_static if link.stress.surface else None,
         input_hash=input_hash(link),

@@ -28,7 +28,7 @@ from ...common.arrays import Array
 from ..link_records.link import BeamLink
 from ..modal_body.lumped_masses import of_turning
 from ..modal_body.parts import LEVI_CIVITA, Invariants
-from ..modal_body.unit_loads import inertia_wrenches, interface_load_names, unit_load_names
+from ..modal_body.unit_loads import MOTIONS, inertia_wrenches
 from .line import R_X, R_Y, R_Z, U_X, U_Y, U_Z, Functions, gram
 from .sections import Property, cellwise
 
@@ -101,28 +101,22 @@ ROTARY: Sequence[tuple[Property, Sequence[float]]] = (
 POINTS = 5  # Gauss points of an element: exact, since of cubics no product is of a degree above 8
 
 
-def geometric_stiffness(
-    link: BeamLink, stations: Functions, fields: Array, interfaces: dict[str, float]
-) -> dict[str, Array]:
-    """Return geometric stiffness (n, n) by unit load (`unit_loads`), under the link's reference condition.
+def geometric_stiffness(link: BeamLink, stations: Functions, fields: Array, interfaces: dict[str, float]) -> Array:
+    """Return geometric stiffness (l, n, n) of the unit loads (`unit_loads`), under the link's reference condition.
 
     `fields` (6, k, n) are rows U_X … R_Z at k stations; every interface, at its m from the root, is a vertex of their
     mesh. Euler–Bernoulli links are a line of mass: their spin inertia has no second-order motion.
     """
     x, weight, values, slopes = _at_gauss_points(stations, fields)
     forces = section_forces(link, x, interfaces, ROTARY if link.model.theory == "timoshenko" else ())
-    names, n = unit_load_names(interfaces), fields.shape[2]
-    weighted_forces = np.array([forces[name] for name in names]) * weight  # (loads, 6, g)
-    total = np.zeros((len(names), n, n))
-    for row, products in enumerate(_products(values, slopes)):
-        total += np.tensordot(weighted_forces[:, row], products, axes=1)
-    matrices = dict(zip(names, 0.5 * (total + total.transpose(0, 2, 1)), strict=True))
+    pairs = zip(forces * weight, _products(values, slopes), strict=True)
+    total = np.sum([np.tensordot(force, products, axes=1) for force, products in pairs], axis=0)
+    matrices = 0.5 * (total + total.transpose(0, 2, 1))
     if link.model.theory == "timoshenko":
         for k, (moment, _) in enumerate(ROTARY, start=1):
             W = weighted(link, stations, moment, link.material.density)
             products = np.array([[a.T @ (W @ b) for b in fields[R_X:]] for a in fields[R_X:]])
-            for name, matrix in of_turning(np.diag(np.eye(3)[k]), products).items():
-                matrices[name] = matrices[name] + matrix
+            matrices[3:MOTIONS] += of_turning(np.diag(np.eye(3)[k]), products)
     return matrices
 
 
@@ -148,23 +142,23 @@ def _products(values: Array, slopes: Array) -> Array:
 
 def section_forces(
     link: BeamLink, x: Array, interfaces: Mapping[str, float], rotary: Sequence[tuple[Property, Sequence[float]]]
-) -> dict[str, Array]:
-    """Return force and moment (6, g) at x (g,) in the straight link by unit load, under its reference condition.
+) -> Array:
+    """Return force and moment (6, l, g) at x (g,) in the straight link by unit load, under its reference condition.
 
     Loads at the tip act on the section there, too. `rotary`: the inertia of sections that turn, see `ROTARY`.
     """
-    by_load, length = _of_inertia(link, x, rotary), link.geometry.length
-    for name, position in interfaces.items():
+    of_inertia, length, units = _of_inertia(link, np.append(x, 0.0), rotary), link.geometry.length, np.eye(6)[..., None]
+    forces, at_root = [of_inertia[..., :-1]], [of_inertia[..., -1:]]
+    for position in interfaces.values():
         beyond = np.where((x < position) | (position == length), 1.0, 0.0)
-        for load, unit in zip(interface_load_names([name]), np.eye(6)[:, :, None], strict=True):
-            by_load[load] = of_load(unit, position - x) * beyond, of_load(unit, np.array([position]))
-    if link.reference.holds_root:
-        return {load: forces for load, (forces, _) in by_load.items()}
-    return {load: forces + of_tip_support(link, x, at_root) for load, (forces, at_root) in by_load.items()}
+        forces.append(of_load(units, position - x) * beyond)
+        at_root.append(of_load(units, np.array([position])))
+    total = np.concatenate(forces, axis=1)
+    return total if link.reference.holds_root else total + of_tip_support(link, x, np.concatenate(at_root, axis=1))
 
 
 def of_load(load: Array, arm: Array) -> Array:
-    """Return force (N), moment (N·m) (6, g), from `load` (6, 1) or (6, g), that acts `arm` (g,), m, further along x."""
+    """Return force, N, and moment, N·m (6, …, g), of `load` (6, …, 1 or g) that acts `arm` (g,), m, further along x."""
     force, moment = load[:3] * np.ones_like(arm), load[3:]
     return np.concatenate([force, moment + _lever(force * arm)])
 
@@ -175,35 +169,26 @@ def _lever(force: Array) -> Array:
 
 
 def of_tip_support(link: BeamLink, x: Array, at_root: Array) -> Array:
-    """Force, N, and moment, N·m (6, g) at x (g,), m, of a tip support that bears moments `at_root` (6, 1) or (6, g)."""
+    """Force, N, and moment, N·m (6, …, g) at x (g,), m, of a tip support with moments `at_root` (6, …, 1 or g)."""
     L, none = link.geometry.length, np.zeros_like(at_root[0])
     return of_load(np.stack([none, -at_root[5] / L, at_root[4] / L, none, none, none]), L - x)
 
 
-def _of_inertia(
-    link: BeamLink, x: Array, rotary: Sequence[tuple[Property, Sequence[float]]]
-) -> dict[str, tuple[Array, Array]]:
-    """(6, g) of d'Alembert's loads on the link fixed at its root, and their sums about the root (6, 1).
+def _of_inertia(link: BeamLink, x: Array, rotary: Sequence[tuple[Property, Sequence[float]]]) -> Array:
+    """(6, `MOTIONS`, g) of d'Alembert's loads on the link fixed at its root.
 
     Sections at s bear forces ρA (a + b s), of small bodies at 0 and 1 m, and, with rotary inertia, moments.
     """
     e1, nothing = np.eye(3)[:1], np.zeros(1)
-    M = [_beyond(link, np.append(x, 0.0), lambda s: s.area, power) for power in range(3)]
-    turning = [
-        (_beyond(link, np.append(x, 0.0), moment, 0), inertia_wrenches(0 * e1, nothing, np.array([inertia])))
-        for moment, inertia in rotary
-    ]
-    at_0, at_1 = (inertia_wrenches(place, np.ones(1), np.zeros((1, 3))) for place in (0 * e1, e1))
-    forces = {}
-    for load in at_0:
-        a = at_0[load][0, :3, None]
-        b = at_1[load][0, :3, None] - a
-        n = a * M[0] + b * M[1]
-        m = _lever(a * M[1] + b * M[2] - np.append(x, 0.0) * n)
-        m = m + sum(wrenches[load][0, 3:, None] * J for J, wrenches in turning)
-        both = np.concatenate([n, m])
-        forces[load] = both[:, :-1], both[:, -1:]
-    return forces
+    M = [_beyond(link, x, lambda s: s.area, power) for power in range(3)]
+    a, b = (inertia_wrenches(place, np.ones(1), np.zeros((1, 3)))[0, :3, :, None] for place in (0 * e1, e1))
+    b = b - a
+    n = a * M[0] + b * M[1]
+    m = _lever(a * M[1] + b * M[2] - x * n)
+    for moment, inertia in rotary:
+        wrenches = inertia_wrenches(0 * e1, nothing, np.array([inertia]))
+        m += wrenches[0, 3:, :, None] * _beyond(link, x, moment, 0)
+    return np.concatenate([n, m])
 
 
 def _beyond(link: BeamLink, x: Array, moment: Property, power: int) -> Array:

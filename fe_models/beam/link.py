@@ -7,22 +7,22 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array
 from ...common.errors import InputError
-from ...common.version import VERSION
 from ...mesh.structured import graded_nodes, with_points
 from ..link_records.families import DEFAULT_COUNT, FAMILIES, Family
 from ..link_records.link import BeamLink
 from ..modal_body import Interface, ModalBody, PictureMesh, Stations
 from ..modal_body.attachment_modes import ascending
-from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_masses, with_lumped_stiffness
-from ..modal_body.measured import canonical_signs, damping_ratio
+from ..modal_body.lumped_masses import lump_weights, lumps
+from ..modal_body.measured import canonical_signs
+from ..modal_body.of_link import modal_body_of
 from .beam import BeamForms, FamilyModel, family_model
 from .invariants import geometric_stiffness, shape_integrals
 from .line import R_X, Functions, lagrange
 from .modes import Mode, attachment_modes, fixed_interfaces, lowest_modes, modes_of, ritz_modes
 from .sections import section_outlines, shear_modulus
-from .stress import beam_stresses, segments, stress_loads
+from .stress import beam_stresses, segments
 
 # Elements are not cut closer to their ends than this fraction of their length.
 SLIVER = 0.01
@@ -57,35 +57,23 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
         for (name, x), k in zip(named.items(), places, strict=True)
     }
     attached = lumps(link.interface, interfaces)
-    integrals = with_lumped_masses(shape_integrals(link, stations, fields), attached)
-    omega: Array = np.sqrt([mode.omega2 for mode in modes])
+    omega2, families = np.array([mode.omega2 for mode in modes]), tuple(mode.family for mode in modes)
     translation, rotation = np.moveaxis(fields[:R_X], 0, 1), np.moveaxis(fields[R_X:], 0, 1)
     position = np.outer(stations.x, [1.0, 0.0, 0.0])
-    families = tuple(mode.family for mode in modes)
-    residual = np.repeat([0, 1], [count, omega.size - count])
     kept = _with_sections(link, stations, position, translation, rotation)
-    return ModalBody(
-        name=link.name,
-        kind=link.geometry.kind,
-        reference_condition=link.reference.condition,
-        length=link.geometry.length,
-        **vars(integrals),
-        frequency=as_floats(omega / (2 * np.pi)),
-        stiffness=np.diag(omega**2),
+    return modal_body_of(
+        link,
+        omega2,
+        families,
+        count,
+        interfaces,
+        attached,
+        integrals=shape_integrals(link, stations, fields),
+        geometric_stiffness=geometric_stiffness(link, stations, fields, named),
         modal_mass=modal_mass,
-        damping_ratio=damping_ratio(link, omega),
-        damping_of=link.damping.of,
-        family=families,
-        residual=residual,
-        geometric_stiffness=with_lumped_stiffness(geometric_stiffness(link, stations, fields, named), attached),
-        interfaces=interfaces,
         stations=kept,
-        stress=beam_stresses(
-            link, kept, omega**2, families, attached=attached, residual=residual, interfaces=interfaces
-        ),
-        stress_loads=stress_loads(link, interfaces),
+        stress=beam_stresses(link, kept, omega2, families, count, attached=attached, interfaces=interfaces),
         mesh=PictureMesh(position, stations.element[:, [0, 3]], translation),
-        ffrobot_version=VERSION,
     )
 
 

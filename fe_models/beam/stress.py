@@ -16,9 +16,9 @@ from ...common.arrays import Array, Integers
 from ..link_records.link import BeamLink
 from ..modal_body import Interface, Stations, StressPoint, craig_bampton
 from ..modal_body.attachment_modes import interface_loads
-from ..modal_body.lumped_masses import Lump, lump_weights, with_lumped_loads
+from ..modal_body.lumped_masses import Lump, loads_with_lumps, lump_weights
 from ..modal_body.parts import through
-from ..modal_body.unit_loads import interface_load_names, unit_load_names
+from ..modal_body.unit_loads import loads_at, unit_load_names
 from .invariants import ROTARY, of_load, of_tip_support, section_forces
 from .section_stress import section_stress
 from .sections import Property
@@ -29,36 +29,35 @@ def beam_stresses(
     stations: Stations,
     omega2: Array,
     families: Sequence[str],
+    eigenmodes: int,
+    *,
     attached: Sequence[Lump],
-    residual: Integers,
     interfaces: Mapping[str, Interface],
 ) -> dict[str, StressPoint]:
     """Stresses and strains of modes, and static stresses of unit loads, at the points that the link file names.
 
     Bending, axial force, torque and transverse shear: see `section_stress`. Strains by Hooke's law. At a step of the
     section, the section beyond it counts; at a lump, what the beam carries just beyond it. `omega2` (n,) is ω² in
-    rad²/s², `residual` (n,) 1 of residual attachment modes; `attached` lumps and `interfaces` have what the modes do
-    there.
+    rad²/s², of `eigenmodes` and attachment modes; `attached` lumps and `interfaces` have what the modes do there.
     """
     if link.reference.condition == "craig-bampton":
-        W, loads_at = craig_bampton.interface_loads(omega2, families, int(residual.sum()), interfaces)
+        W, by_name = craig_bampton.interface_loads(omega2, families, omega2.size - eigenmodes, interfaces)
     else:
-        W, loads_at = interface_loads(omega2, residual, interfaces)
-    loads = list(loads_at.items())
+        W, by_name = interface_loads(omega2, eigenmodes, interfaces)
+    loads = list(by_name.items())
     for lump in attached:
-        motion = np.concatenate([lump.at.translation, lump.at.rotation])
-        loads.append((lump.name, lump_weights(lump.mass, lump.inertia)[:, None] * motion @ W))
-    E, nu = link.material.youngs_modulus, link.material.poissons_ratio
+        loads.append((lump.name, lump_weights(lump.mass, lump.inertia)[:, None] * lump.at.motion @ W))
+    E, nu, names = link.material.youngs_modulus, link.material.poissons_ratio, unit_load_names(interfaces)
+    with_lumps = loads_with_lumps(names, attached)
     points, places = {}, {name: float(at.position[0]) for name, at in interfaces.items()}
     for name, position in link.stress.points.items():
         assert nu is not None  # the link file has been checked for it
         x, y, z = position
-        of_loads = section_forces(link, np.array([x]), places, _rotary(link))
+        of_loads = section_forces(link, np.array([x]), places, _rotary(link))[..., 0]
         of_modes = _of_inertia(link, stations, W, x)
         for place, load in loads:
-            of_modes = of_modes + np.hstack([of_loads[unit] for unit in interface_load_names([place])]) @ load
-        static = with_lumped_loads(of_loads, attached)
-        forces = np.hstack([of_modes, *(static[unit] for unit in unit_load_names(interfaces))])
+            of_modes = of_modes + of_loads[:, loads_at(names, place)] @ load
+        forces = np.hstack([of_modes, of_loads @ with_lumps])
         segment = int(segments(link, np.array(x)))
         stress = section_stress(link.shapes[segment], link.sections[segment], forces[:3], forces[3:], y, z)
         modal, static_stress = stress[:, : len(W)], stress[:, len(W) :]
@@ -66,11 +65,6 @@ def beam_stresses(
         strain[:3] = np.outer([1.0, -nu, -nu], modal[0] / E)
         points[name] = StressPoint(np.array(position), modal, strain, static_stress)
     return points
-
-
-def stress_loads(link: BeamLink, interfaces: Mapping[str, Interface]) -> tuple[str, ...]:
-    """Names of the unit loads whose static stresses are stored; none without stress points."""
-    return tuple(unit_load_names(interfaces)) if link.stress.points else ()
 
 
 def _rotary(link: BeamLink) -> Sequence[tuple[Property, Sequence[float]]]:

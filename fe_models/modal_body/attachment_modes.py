@@ -140,26 +140,26 @@ def uncoupled(K: Array, of: Integers) -> tuple[Array, Array, Integers]:
 
 
 def interface_loads(
-    omega2: Array, residual: Integers, interfaces: Mapping[str, Interface]
+    omega2: Array, eigenmodes: int, interfaces: Mapping[str, Interface]
 ) -> tuple[Array, dict[str, Array]]:
     """The loads that bend a link into each of its n modes, as far as they are loads at interfaces.
 
     W (n, n): the inertia in column k is M times the modes times W[:, k]; and by interface (6, n), force in N and moment
-    in N·m per unit of modal coordinate. K x = ω² M x of an eigenmode x. Of a residual mode r = R c (`residual` (n,) is
-    1) it is Bc − M X XᵀBc: loads c at the interfaces, and the opposite of the inertia that the eigenmodes have of them;
-    c follows from the work rᵀBc = rᵀKr.
+    in N·m per unit of modal coordinate. K x = ω² M x of an eigenmode x. Of a residual mode r = R c, behind the
+    `eigenmodes`, it is Bc − M X XᵀBc: loads c at the interfaces, and the opposite of the inertia that the eigenmodes
+    have of them; c follows from the work rᵀBc = rᵀKr.
     """
-    static = residual.astype(bool)
-    W = np.diag(np.where(static, 0.0, omega2))
-    if not static.any():
+    W, of = np.diag(omega2), slice(eigenmodes, None)
+    W[of, of] = 0.0
+    if eigenmodes == omega2.size:
         return W, {}
-    rows = np.concatenate([np.concatenate([at.translation, at.rotation]) for at in interfaces.values()])
+    rows = np.concatenate([at.motion for at in interfaces.values()])
     flexibility = np.square(rows) @ (1.0 / omega2)
     scale = np.zeros(len(rows))
     # Loads that do no work on any mode are carried by the supports.
     scale[flexibility > 0.0] = 1.0 / np.sqrt(flexibility[flexibility > 0.0])
-    work = (rows[:, static] * scale[:, None]).T
+    work = (rows[:, of] * scale[:, None]).T
     c = np.zeros(rows.shape)
-    c[:, static] = scale[:, None] * np.linalg.pinv(work, rcond=TOLERANCE**2) * omega2[static]
-    W[np.ix_(~static, static)] = -rows[:, ~static].T @ c[:, static]
+    c[:, of] = scale[:, None] * np.linalg.pinv(work, rcond=TOLERANCE**2) * omega2[of]
+    W[:eigenmodes, of] = -rows[:, :eigenmodes].T @ c[:, of]
     return W, dict(zip(interfaces, c.reshape(len(interfaces), 6, -1), strict=True))

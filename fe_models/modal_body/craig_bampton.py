@@ -71,7 +71,7 @@ def constraint_modes(omega2: Array, families: Sequence[str], interfaces: Mapping
     families = [str(family) for family in families]
     moving = {k for family in FAMILIES if family in families for k in COMPONENTS[family]}
     others = [at for name, at in interfaces.items() if name != ROOT]
-    rows = np.concatenate([np.concatenate([at.translation, at.rotation]) for at in others]) / np.sqrt(omega2)
+    rows = np.concatenate([at.motion for at in others]) / np.sqrt(omega2)
     size = np.linalg.norm(rows, axis=1).reshape(-1, 2, 3)
     moved = (size > IMMOBILE * size.max(axis=(0, 2), keepdims=True)).ravel()
     expected = np.tile([k in moving for k in range(6)], len(others))
@@ -91,8 +91,7 @@ def interface_coordinates(
     """
     moving = sorted({k for family in FAMILIES if family in families for k in COMPONENTS[family]})
     names = [f"{name}/{AXES[k]}" for name in interfaces if name != ROOT for k in moving]
-    motions = [np.concatenate([at.translation, at.rotation])[moving] for name, at in interfaces.items() if name != ROOT]
-    rows = np.concatenate(motions)
+    rows = np.concatenate([at.motion[moving] for name, at in interfaces.items() if name != ROOT])
     if len(rows) != static:
         raise InputError(
             f"craig-bampton: expected interfaces that can move freely ({', '.join(names)})",

@@ -7,7 +7,7 @@ material points x_I + ξ move by Φ0 + φ × ξ, with translation Φ0 and rotati
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -18,7 +18,7 @@ from ...common.errors import InputError
 from ...common.structs import struct
 from .body import IDENTITY_TOLERANCE
 from .parts import LEVI_CIVITA, Interface, Invariants
-from .unit_loads import PAIRS, inertia_wrenches, interface_load_names
+from .unit_loads import MOTIONS, PAIRS, inertia_wrenches, loads_at
 
 if TYPE_CHECKING:  # stage 2 does without the records of links
     from ..link_records.link import InterfaceRecord
@@ -99,43 +99,39 @@ def attached_integrals(m: float, x: Array, E: Array, Phi: Array, phi: Array) -> 
     }
 
 
-def with_lumped_loads(of_loads: Mapping[str, Array], attached: Iterable[Lump]) -> dict[str, Array]:
-    """Return quantities linear in the loads of a link (geometric stiffness, static stress), including lumps' inertia.
+def loads_with_lumps(names: Sequence[str], attached: Iterable[Lump]) -> Array:
+    """T (l, l): under unit load k of `names` a link with lumps bears the unit loads T[:, k] of the bare link.
 
-    A lump loads the link by its inertia force and moment at its interface, which are among the loads themselves:
-    `of_loads` has an array for each unit load (`unit_loads`) of the bare link.
+    A lump loads the link by its inertia force and moment at its interface, which are among the loads themselves.
     """
-    total = dict(of_loads)
+    T = np.eye(len(names))
     for lump in attached:
-        wrenches = inertia_wrenches(lump.at.position[None], np.array([lump.mass]), lump.inertia[None])
-        for load, wrench in wrenches.items():
-            for unit, size in zip(interface_load_names([lump.name]), wrench[0], strict=True):
-                if size:
-                    total[load] = total[load] + size * of_loads[unit]
-    return total
+        wrench = inertia_wrenches(lump.at.position[None], np.array([lump.mass]), lump.inertia[None])[0]
+        T[loads_at(names, lump.name), :MOTIONS] += wrench
+    return T
 
 
-def with_lumped_stiffness(matrices: Mapping[str, Array], attached: Iterable[Lump]) -> dict[str, Array]:
-    """Geometric stiffness (n, n) by unit load, N or N·m, with that of lumps: inertia loads, points that turn."""
-    attached = list(attached)
-    total = with_lumped_loads(matrices, attached)
+def with_lumped_stiffness(matrices: Array, names: Sequence[str], attached: Sequence[Lump]) -> dict[str, Array]:
+    """Geometric stiffness (n, n) by unit load, N or N·m, with that of lumps: inertia loads, points that turn.
+
+    `matrices` (l, n, n) are those of the bare link.
+    """
+    total = np.tensordot(loads_with_lumps(names, attached).T, matrices, axes=1)
     for lump in attached:
         phi = lump.at.rotation
-        for load, more in of_turning(lump.spread, np.einsum("am,bn->abmn", phi, phi)).items():
-            total[load] = total[load] + more
-    return total
+        total[3:MOTIONS] += of_turning(lump.spread, np.einsum("am,bn->abmn", phi, phi))
+    return dict(zip(names, total, strict=True))
 
 
-def of_turning(E: Array, products: Array) -> dict[str, Array]:
-    """Return geometric stiffness (n, n) by load: d'Alembert's loads on a rigid body that turns, to second order.
+def of_turning(E: Array, products: Array) -> Array:
+    """Geometric stiffness (9, n, n) of the loads r_x … omega_yz: d'Alembert's on a rigid body that turns.
 
-    A point d from its center moves by ½ φ × (φ × d) = −½ (d φ² − φ φ·d) besides φ × d. Of d φ² − φ φ·d = pᵀG p are
-    K_x,kl = ∫ρ d_k G_l dV, and from them K_ω = 1 tr K_x − sym K_x and K_r,a = ε_abc K_x,bc (docs/theory.md). E (3, 3)
-    is ∫ρ d dᵀ dV in kg·m², `products` (3, 3, n, n) φ_a φ_b.
+    To second order, a point d from its center moves by ½ φ × (φ × d) = −½ (d φ² − φ φ·d) besides φ × d. Of d φ² − φ
+    φ·d = pᵀG p are K_x,kl = ∫ρ d_k G_l dV, and from them K_ω = 1 tr K_x − sym K_x and K_r,a = ε_abc K_x,bc
+    (docs/theory.md). E (3, 3) is ∫ρ d dᵀ dV in kg·m², `products` (3, 3, n, n) φ_a φ_b.
     """
     products = 0.5 * (products + products.transpose(0, 1, 3, 2))
     K_x = np.einsum("kl,aamn->klmn", E, products) - np.einsum("kb,blmn->klmn", E, products)
     K_omega = np.einsum("ij,kkmn->ijmn", np.eye(3), K_x) - 0.5 * (K_x + K_x.transpose(1, 0, 2, 3))
     K_r = np.einsum("abc,bcmn->amn", LEVI_CIVITA, K_x)
-    by_load = {f"r_{axis}": -K_r[a] for a, axis in enumerate("xyz")}  # of d'Alembert's loads
-    return by_load | {f"omega_{name}": K_omega[i, j] * (1.0 if i == j else 2.0) for name, (i, j) in PAIRS.items()}
+    return np.array([*-K_r, *(K_omega[i, j] * (1.0 if i == j else 2.0) for i, j in PAIRS.values())])

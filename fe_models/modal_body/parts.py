@@ -90,6 +90,11 @@ class Interface(Frozen):
     rotation: Array
     coupling: str = ""
 
+    @property
+    def motion(self) -> Array:
+        """Translation, then rotation (6, n)."""
+        return np.concatenate([self.translation, self.rotation])
+
 
 @struct
 class Stations(Frozen):

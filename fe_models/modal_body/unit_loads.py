@@ -9,7 +9,7 @@
 | `moment/NAME/x` … | unit moment there |
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from ...common.arrays import Array
 from .parts import Interface
 
 PAIRS = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+MOTIONS = 12  # unit loads of inertia, which come before those at interfaces
 
 
 def interface_load_names(interfaces: Iterable[str]) -> list[str]:
@@ -30,25 +31,28 @@ def unit_load_names(interfaces: Iterable[str]) -> list[str]:
     return motions + interface_load_names(interfaces)
 
 
-def inertia_wrenches(x: Array, mass: Array, inertia: Array) -> dict[str, Array]:
-    """D'Alembert force and moment (q, 6) of small bodies for each unit motion of the frame.
+def loads_at(names: Sequence[str], interface: str) -> slice:
+    """Which of the unit loads `names` are at an interface: three forces, then three moments."""
+    first = names.index(f"force/{interface}/x")
+    return slice(first, first + 6)
+
+
+def inertia_wrenches(x: Array, mass: Array, inertia: Array) -> Array:
+    """D'Alembert force and moment (q, 6, `MOTIONS`) of small bodies for each unit motion of the frame.
 
     Frame acceleration a, angular acceleration α and angular velocity ω (Newton and Euler): force −m [a + α × x + ω × (ω
     × x)], moment −J α − ω × J ω about the center; x (q, 3) m, `mass` (q,) kg, `inertia` (q, 3) J_x, J_y, J_z in kg·m².
     """
-    e = np.eye(3)
-    m = mass[:, None]
-    wrenches = dict[str, Array]()
-    for axis, unit in zip("xyz", e, strict=True):
-        wrenches[f"t_{axis}"] = np.hstack([-m * unit, np.zeros_like(x)])
-    for axis, unit in zip("xyz", e, strict=True):
-        wrenches[f"r_{axis}"] = np.hstack([-m * np.cross(unit, x), -inertia * unit])
-    for name, (k, j) in PAIRS.items():
-        wrench = np.zeros((len(x), 6))
+    e, m = np.eye(3), mass[:, None]
+    wrenches = np.zeros((len(x), 6, MOTIONS))
+    for k, unit in enumerate(e):
+        wrenches[:, :3, k] = -m * unit
+        wrenches[:, :3, 3 + k] = -m * np.cross(unit, x)
+        wrenches[:, 3:, 3 + k] = -inertia * unit
+    for column, (k, j) in enumerate(PAIRS.values(), start=6):
         for a, b in [(k, j)] if k == j else [(k, j), (j, k)]:
-            wrench[:, :3] -= m * np.cross(e[a], np.cross(e[b], x))
-            wrench[:, 3:] -= np.cross(e[a], inertia * e[b])
-        wrenches[f"omega_{name}"] = wrench
+            wrenches[:, :3, column] -= m * np.cross(e[a], np.cross(e[b], x))
+            wrenches[:, 3:, column] -= np.cross(e[a], inertia * e[b])
     return wrenches
 
 
@@ -71,6 +75,5 @@ def work_on_modes(
     for name, (a, b) in PAIRS.items():  # −e_a × (e_b × x) = δ_ab x − x_a e_b
         work[f"omega_{name}"] = trace - I_bar[a, a] if a == b else -(I_bar[a, b] + I_bar[b, a])
     for name, at in interfaces.items():
-        rows = np.concatenate([at.translation, at.rotation])
-        work |= dict(zip(interface_load_names([name]), rows, strict=True))
+        work |= dict(zip(interface_load_names([name]), at.motion, strict=True))
     return work

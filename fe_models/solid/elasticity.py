@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 import ufl
 from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
@@ -45,27 +44,21 @@ class MaterialMap:
 
 @struct
 class ScalarMass:
-    """M_ab = ∫ρ N_a N_b dV over the nodes, rows of this rank's own nodes."""
+    """M_ab = ∫ρ N_a N_b dV over the nodes."""
 
-    csr: sp.csr_matrix  # (owned, owned + foreign)
-    # fetches the foreign nodes' displacements of a vector into `foreign`; None on one process
-    scatter: PETSc.Scatter | None
-    foreign: PETSc.Vec
-    comm: Any  # of the processes
+    matrix: PETSc.Mat
 
     def __matmul__(self, U: Array) -> Array:
         """M U of displacements U (3 owned, n), the same matrix for each component; collective."""
-        n = U.shape[1]
-        if self.scatter is None:
-            return np.asarray(self.csr @ U.reshape(-1, 3 * n)).reshape(-1, n)
-        foreign = np.empty((self.foreign.getLocalSize(), n))
-        vector = PETSc.Vec().createMPI((U.shape[0], None), bsize=3, comm=self.comm)
-        for k in range(n):
-            vector.array[:] = U[:, k]
-            self.scatter.scatter(vector, self.foreign)
-            foreign[:, k] = self.foreign.array_r
-        vector.destroy()
-        return np.asarray(self.csr @ np.concatenate([U, foreign]).reshape(-1, 3 * n)).reshape(-1, n)
+        columns = np.asfortranarray(U.reshape(-1, 3 * U.shape[1]))
+        size = self.matrix.getSizes()[0], (None, columns.shape[1])
+        factor = PETSc.Mat().createDense(size, array=columns, comm=self.matrix.comm)
+        factor.assemble()
+        product = self.matrix.matMult(factor)
+        result = np.array(product.getDenseArray(), order="C").reshape(U.shape)
+        for used in (factor, product):  # PETSc keeps what Python alone lets go
+            used.destroy()
+        return result
 
 
 @struct
@@ -175,9 +168,6 @@ def solid_model(mesh: Mesh, order: int, materials: MaterialMap) -> SolidModel:
     dx = ufl.dx(metadata={"quadrature_degree": 2 * order + curved})
     M = fem_petsc.assemble_matrix(compiled_form(rho * a * b * dx))
     M.assemble()
-    mass, pattern = _scalar_mass(M, mesh.comm)
-    local_to_global = M.getLGMap()[0]
-    M.destroy()  # PETSc keeps what Python alone lets go
     return SolidModel(
         mesh=mesh,
         order=order,
@@ -185,9 +175,9 @@ def solid_model(mesh: Mesh, order: int, materials: MaterialMap) -> SolidModel:
         x=np.array(V.tabulate_dof_coordinates()[:owned]),
         nodes=nodes,
         materials=materials,
-        mass=mass,
-        pattern=pattern,
-        local_to_global=local_to_global,
+        mass=ScalarMass(M),
+        pattern=_pattern(M),
+        local_to_global=M.getLGMap()[0],
         stiffness_form=compiled_form(_stiffness_form(V, materials, strain_degree(mesh, order))),
     )
 
@@ -245,22 +235,11 @@ def _cellwise(mesh: Mesh, values: Array, of_cell: Integers) -> fem.Function:
     return function
 
 
-def _scalar_mass(M: PETSc.Mat, comm: MPI.Comm) -> tuple[ScalarMass, tuple[Integers, Integers]]:
-    """M's own rows as SciPy matrix, and how many blocks an upper triangle of the same pattern has in each."""
-    indptr, columns, values = M.getValuesCSR()
+def _pattern(M: PETSc.Mat) -> tuple[Integers, Integers]:
+    """How many blocks an upper triangle of the pattern of M has in each row: in own columns, and in later ranks'."""
+    indptr, columns, _ = M.getValuesCSR()
     first, end = M.getOwnershipRange()
-    row = np.repeat(np.arange(first, end), np.diff(indptr))
-    inside = (columns >= first) & (columns < end)
-    within = np.bincount(row[inside & (columns >= row)] - first, minlength=end - first)
-    beyond = np.bincount(row[columns >= end] - first, minlength=end - first)
-    foreign = np.unique(columns[~inside])
-    local = np.where(inside, columns - first, end - first + np.searchsorted(foreign, columns))
-    csr = sp.csr_matrix((values, local, indptr), shape=(end - first, end - first + foreign.size))
-    scatter, target = None, PETSc.Vec().createSeq(3 * foreign.size, bsize=3, comm=PETSc.COMM_SELF)
-    if comm.size > 1:
-        source = PETSc.Vec().createMPI((3 * (end - first), None), bsize=3, comm=comm)
-        here = PETSc.IS().createBlock(3, foreign.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
-        there = PETSc.IS().createStride(3 * foreign.size, step=1, comm=PETSc.COMM_SELF)
-        scatter = PETSc.Scatter().create(source, here, target, there)
-    counts = (within.astype(PETSc.IntType), beyond.astype(PETSc.IntType))
-    return ScalarMass(csr, scatter, target, comm), counts
+    row = np.repeat(np.arange(end - first), np.diff(indptr))
+    kept = columns >= first + row, columns >= end
+    upper, beyond = (np.bincount(row[one], minlength=end - first).astype(PETSc.IntType) for one in kept)
+    return upper - beyond, beyond

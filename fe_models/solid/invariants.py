@@ -20,7 +20,7 @@ import numpy as np
 from ...common.arrays import Array
 from ..modal_body import Interface
 from ..modal_body.parts import Invariants
-from ..modal_body.unit_loads import inertia_wrenches, interface_load_names
+from ..modal_body.unit_loads import MOTIONS, inertia_wrenches, loads_at, unit_load_names
 from .elasticity import SolidModel
 from .stress import geometric_stiffness, internal_forces
 from .supports import Flexibility
@@ -48,75 +48,65 @@ def shape_integrals(model: SolidModel, modes: Array) -> Invariants:
     )
 
 
-def unit_loads(model: SolidModel, interfaces: Mapping[str, Array]) -> dict[str, Array]:
-    """Return consistent nodal forces (3 owned,) of each unit load (docs/theory.md, Geometric stiffness); collective.
+def unit_loads(model: SolidModel, interfaces: Mapping[str, Array]) -> Array:
+    """Return consistent nodal forces (3 owned, l) of the unit loads (docs/theory.md, Geometric stiffness); collective.
 
     D'Alembert forces −ρ(a + α × x + ω × (ω × x)) of unit a, α and products of ω (of xy, the terms of ω_x ω_y and ω_y
     ω_x together), and unit forces and moments at interfaces, which the transpose of their mean motion B (6, 3 owned)
     spreads.
     """
     wrenches = inertia_wrenches(model.x, np.ones(len(model.x)), np.zeros_like(model.x))
-    fields = {name: np.ascontiguousarray(wrench[:, :3]) for name, wrench in wrenches.items()}
-    forces = model.mass @ np.stack([field.reshape(-1) for field in fields.values()], axis=1)
-    loads = dict(zip(fields, forces.T, strict=True))
-    for name, B in interfaces.items():
-        loads |= dict(zip(interface_load_names([name]), B, strict=True))
-    return loads
+    return np.hstack([model.mass @ wrenches[:, :3].reshape(-1, MOTIONS), *(B.T for B in interfaces.values())])
 
 
-def static_shapes(flexibility: Flexibility, loads: Mapping[str, Array]) -> dict[str, Array]:
-    """Return displacements (3 owned,), m, under each of the `unit_loads`, by the reference condition; collective."""
-    model = flexibility.model
-    forces = np.stack(list(loads.values()), axis=1)
-    displacements = flexibility @ forces
+def static_shapes(flexibility: Flexibility, loads: Array) -> Array:
+    """Return displacements (3 owned, l), m, under `loads` (3 owned, l), N, by the reference condition; collective."""
+    displacements = flexibility @ loads
     # Bending stresses cancel over a section: the round-off errors of an assembled K, small as they are, would show.
-    displacements += flexibility @ (forces - internal_forces(model, displacements))
-    return dict(zip(loads, displacements.T, strict=True))
+    return displacements + flexibility @ (loads - internal_forces(flexibility.model, displacements))
 
 
 def prestressed(
     flexibility: Flexibility,
     modes: Array,
-    loads: Mapping[str, Array],
-    shapes: Mapping[str, Array],
+    loads: Array,
+    shapes: Array,
     *,
     rows: Mapping[str, Array],
     interfaces: Mapping[str, Interface],
     supports: Mapping[str, Sequence[int]],
-) -> dict[str, Array]:
-    """Return geometric stiffness (n, n) of `modes` (3 owned, n) by unit load; collective.
+) -> Array:
+    """Return geometric stiffness (l, n, n) of `modes` (3 owned, n) by unit load; collective.
 
-    It is that for centers and rotation vectors of the interfaces. `loads` and `shapes` (3 owned,) are nodal forces, N,
-    and displacements, m, by unit load, `rows` B (6, 3 owned) the mean motion of each interface, which spreads loads on
-    it. `supports`: components of the mean motion that are fixed, in the order of `flexibility.B`; none of rigid faces.
+    It is that for centers and rotation vectors of the interfaces. `loads` and `shapes` (3 owned, l) are nodal forces,
+    N, and displacements, m, of the unit loads, `rows` B (6, 3 owned) the mean motion of each interface, which spreads
+    loads on it. `supports`: components of the mean motion that are fixed, in the order of `flexibility.B`; none of
+    rigid faces.
     """
-    f, displacements = (np.stack([of[name] for name in loads], axis=1) for of in (loads, shapes))
-    total = geometric_stiffness(flexibility.model, modes, displacements)
-    T = _of_spread_loads(flexibility, list(loads), f, rows, interfaces, supports)
-    for name, more in _of_plates(flexibility, f, displacements).items():
+    total = geometric_stiffness(flexibility.model, modes, shapes)
+    T = _of_spread_loads(flexibility, loads, rows, interfaces, supports)
+    for name, more in _of_plates(flexibility, loads, shapes).items():
         T[name] += more
     for name, t in T.items():
         phi = interfaces[name].rotation
         total += 0.5 * phi.T @ (t + t.transpose(0, 2, 1)) @ phi
         total -= np.trace(t, axis1=1, axis2=2)[:, None, None] * (phi.T @ phi)
-    return dict(zip(loads, total, strict=True))
+    return total
 
 
 def _of_spread_loads(
     flexibility: Flexibility,
-    names: Sequence[str],
     f: Array,
     rows: Mapping[str, Array],
     interfaces: Mapping[str, Interface],
     supports: Mapping[str, Sequence[int]],
 ) -> dict[str, Array]:
     """T (loads, 3, 3) on each interface of what is spread by its rows: the load itself, reactions of mean supports."""
-    model, T = flexibility.model, {}
+    model, names, T = flexibility.model, unit_load_names(rows), {}
     reactions = iter(flexibility.reactions(f))
     for name, B in rows.items():
         sizes = np.zeros((6, len(names)))
-        own = interface_load_names([name])
-        sizes[:, [names.index(load) for load in own]] = np.eye(6)
+        sizes[:, loads_at(names, name)] = np.eye(6)
         for component in supports.get(name, ()):
             sizes[component] += next(reactions)
         arms = model.x - interfaces[name].position

@@ -10,7 +10,6 @@ from dolfinx import fem
 
 from ...common.arrays import Array, Integers, as_floats
 from ...common.errors import InputError
-from ...common.version import VERSION
 
 # First of all that load dolfinx: mesh.compat sets PETSc up.
 from ...mesh.compat import lagrange_element, node_map
@@ -21,8 +20,10 @@ from ...mesh.structured import with_points
 from ..link_records.families import HOLDING_ROOT
 from ..link_records.link import SolidLink
 from ..modal_body import Interface, ModalBody, PictureMesh, Stations
-from ..modal_body.lumped_masses import lump_weights, lumps, with_lumped_loads, with_lumped_masses, with_lumped_stiffness
-from ..modal_body.measured import canonical_signs, damping_ratio
+from ..modal_body.lumped_masses import loads_with_lumps, lump_weights, lumps
+from ..modal_body.measured import canonical_signs
+from ..modal_body.of_link import modal_body_of
+from ..modal_body.unit_loads import unit_load_names
 from .elasticity import MassMatrix, MaterialMap, SolidModel, material_map, solid_model
 from .functionals import Averages, face_averages, outlined_patches, section_averages
 from .invariants import prestressed, shape_integrals, static_shapes, unit_loads
@@ -80,9 +81,9 @@ def solid_modal_body(link: SolidLink, path: Path, progress: Progress, *, remesh:
     count = modes.omega2.size
     if link.modes.attachment_modes:
         progress(f"{link.name}: adding the attachment modes")
-        length, named = link.geometry.length, list(rows)
+        length, count_at = link.geometry.length, len(rows)
         residual = attachment_modes(
-            link.families, mass, modes, loads, shapes, interfaces=named, length=length, twists_along=not fixed
+            link.families, mass, modes, loads, shapes, interfaces=count_at, length=length, twists_along=not fixed
         )
         modes = modes.followed_by(residual)
     if fixed:
@@ -97,38 +98,31 @@ def solid_modal_body(link: SolidLink, path: Path, progress: Progress, *, remesh:
         shift, turn = one.of(model, X)
         interfaces[name] = Interface(one.centroid[0], shift[0], turn[0], link.couplings[name])
     attached = lumps(link.interface, interfaces)
-    integrals = with_lumped_masses(shape_integrals(model, X), attached)
-    omega = np.sqrt(modes.omega2)
     progress(f"{link.name}: integrating the geometric stiffness")
     supports = {} if link.coupling == "rigid" else SUPPORTS[link.reference.condition]
     stiffness = prestressed(flexibility, X, loads, shapes, rows=rows, interfaces=interfaces, supports=supports)
     mesh = _picture(solid, model, seen)
-    recovered = recovered_stresses(link, model, seen, with_lumped_loads(shapes, attached), mesh.points, path)
+    with_lumps = loads_with_lumps(unit_load_names(interfaces), attached)
+    recovered = recovered_stresses(link, model, seen, shapes @ with_lumps, mesh.points, path)
     patches = None
     if link.surface_patch:
         of_faces = model.V, solid.facet_tags, solid.part.faces, link.surface_patch
         patches = outlined_patches(*of_faces, length=link.geometry.length, modes=seen, path=path)
-    return ModalBody(
-        name=link.name,
-        kind=link.geometry.kind,
-        reference_condition=link.reference.condition,
-        length=link.geometry.length,
-        **vars(integrals),
-        frequency=omega / (2 * np.pi),
-        stiffness=np.diag(modes.omega2),
+    return modal_body_of(
+        link,
+        modes.omega2,
+        modes.families,
+        count,
+        interfaces,
+        attached,
+        integrals=shape_integrals(model, X),
+        geometric_stiffness=stiffness,
         modal_mass=model.total(X.T @ (mass @ X)),
-        damping_ratio=damping_ratio(link, omega),
-        damping_of=link.damping.of,
-        family=tuple(modes.families),
-        residual=np.repeat([0, 1], [count, omega.size - count]),
-        geometric_stiffness=with_lumped_stiffness(stiffness, attached),
-        interfaces=interfaces,
         stations=_stations(link, sections, x, element, translation * signs, rotation * signs),
         mesh=mesh,
         **recovered,
         surface_patches=patches,
-        ffrobot_version=VERSION,
-        remarks=solid.part.remarks,
+        remarks=tuple(solid.part.remarks),
     )
 
 

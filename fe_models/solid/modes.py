@@ -22,7 +22,7 @@ from ..link_records.link import SolidLink
 from ..modal_body.attachment_modes import COMPONENTS, Inertia, ModeSet, ascending, residual_modes
 from ..modal_body.craig_bampton import ROOT, in_order
 from ..modal_body.krylov_schur import KrylovSchur
-from ..modal_body.unit_loads import interface_load_names
+from ..modal_body.unit_loads import MOTIONS
 from .elasticity import MassMatrix, SolidModel
 from .functionals import Averages
 from .stress import strain_energy
@@ -34,6 +34,7 @@ REPEATED = 1e-9
 NEARLY = 1e-3
 # Simpson's 3/8 rule on the four stations of an element, exact for cubics.
 SIMPSON = np.array([1.0, 3.0, 3.0, 1.0]) / 8
+R_X = 3  # among unit loads
 _DEFAULT = {str(family): count for family, count in DEFAULT_COUNT.items()}
 
 
@@ -177,30 +178,26 @@ def attachment_modes(
     families: Sequence[Family],
     mass: MassMatrix,
     modes: ModeSet,
-    loads: Mapping[str, Array],
-    shapes: Mapping[str, Array],
-    interfaces: Sequence[str],
+    loads: Array,
+    shapes: Array,
+    interfaces: int,
     length: float,
     twists_along: bool,
 ) -> ModeSet:
-    """Return attachment modes of the loads that belong to `families`; collective.
+    """Return attachment modes of the loads at so many `interfaces` that belong to `families`; collective.
 
-    `loads` (3 owned,), N, and `shapes`, m, by name are those of `invariants.unit_loads` and `static_shapes`; `mass` has
+    `loads` (3 owned, l), N, and `shapes`, m, are those of `invariants.unit_loads` and `static_shapes`; `mass` has
     what is attached; `length` and `twists_along` as of `beam.modes.attachment_modes`.
     """
     model, scale = mass.model, np.repeat([1.0, length], 3)
     static = {}
     for family in families:
-        wanted = [
-            (name, scale[row])
-            for interface in interfaces
-            for row, name in enumerate(interface_load_names([interface]))
-            if row in COMPONENTS[family]
-        ]
+        wanted = [(MOTIONS + 6 * k + row, scale[row]) for k in range(interfaces) for row in COMPONENTS[family]]
         if twists_along and family == "torsion":  # along the link as its inertia about the axis
             turn = np.cross([1.0, 0.0, 0.0], model.x).ravel()
-            wanted.append(("r_x", length / float(model.total(np.array([turn @ loads["r_x"]]))[0])))
-        static[family] = tuple(np.stack([size * of[name] for name, size in wanted], axis=1) for of in (shapes, loads))
+            wanted.append((R_X, length / float(model.total(np.array([turn @ loads[:, R_X]]))[0])))
+        columns, sizes = zip(*wanted, strict=True)
+        static[family] = shapes[:, columns] * sizes, loads[:, columns] * sizes
     inertia = Inertia(lambda U: mass @ U, lambda U: strain_energy(model, U), model.total)
     return residual_modes(static, modes.X, float(modes.omega2.max()), inertia)
 

@@ -109,17 +109,17 @@ INSIDE, ON_CURVED_FACE = 1e-6, 0.02
 
 
 def recovered_stresses(
-    link: SolidLink, model: SolidModel, modes: Array, shapes: Mapping[str, Array], surface: Array, path: Path
+    link: SolidLink, model: SolidModel, modes: Array, shapes: Array, surface: Array, path: Path
 ) -> dict[str, Any]:
     """Compute the stresses that a link file requests: `stress` … `surface_static` of its `ModalBody`.
 
-    `modes` (3 (owned + ghosts), n); `shapes` (3 owned,) static displacements by unit load; `surface` (p, 3) its points.
+    `modes` (3 (owned + ghosts), n); `shapes` (3 owned, l) static displacements of unit loads; `surface` (p, 3) points.
     """
     if not (link.stress.points or link.stress.surface):
         return {}
     n, C = modes.shape[1], model.materials.C[model.materials.of_cell]
-    fields = np.concatenate([modes, model.with_ghosts(np.stack(list(shapes.values()), axis=1))], axis=1)
-    stresses: dict[str, Any] = {"stress_loads": tuple(shapes)}
+    fields = np.concatenate([modes, model.with_ghosts(shapes)], axis=1)
+    stresses: dict[str, Any] = {}
     if link.stress.points:
         points = point_stresses(model.V, C, fields, link.stress.points, path)
         stresses["stress"] = {

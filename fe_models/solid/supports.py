@@ -29,12 +29,13 @@ import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
 
-from ...common.arrays import Array, Integers, as_floats
+from ...common.arrays import Array, Integers
 from ...common.cache import cache_folder
 from ...common.errors import SolveError
 from ...common.locks import is_running, this_process
 from ...common.structs import struct
 from .elasticity import SolidModel, stiffness_matrix
+from .stress import internal_forces
 
 # Share of the free memory that factors may take: larger ones are kept in files, which takes a quarter of it. Reading
 # those for each vector that SLEPc solves for took a third of the time of 377 000 unknowns.
@@ -166,7 +167,7 @@ class Flexibility:
             motion[face.nodes] = _plate(model.x[face.nodes], face.centroid)[:, :, list(face.free)]
             columns.append(motion.reshape(3 * model.owned, -1))
         self.clamped, T = clamped.reshape(-1), np.concatenate(columns, axis=1)
-        KT = _times_stiffness(model, T) if T.shape[1] else T
+        KT = internal_forces(model, T) if T.shape[1] else T
         if faces:
             fixed = np.flatnonzero(model.with_ghosts(self.clamped[:, None].astype(np.float64))[::3, 0])
             K = stiffness_matrix(model, [fem.dirichletbc(np.zeros(3), fixed.astype(np.int32), model.V)])
@@ -190,7 +191,7 @@ class Flexibility:
         S = 0.5 * (S + S.T)
         if self.B is not None:
             S[:6, :6] += np.diag(np.diag(S)[:6])
-        self._S_inverse = as_floats(np.linalg.inv(S))
+        self._S_inverse = np.linalg.inv(S)
 
     def __matmul__(self, loads: Array) -> Array:
         """F f (3 owned, k), m, of loads f (3 owned, k), N; collective."""
@@ -226,19 +227,6 @@ def _plate(x: Array, center: Array) -> Array:
     unit = np.eye(3)
     turns = [np.cross(axis, x - center) for axis in unit]
     return np.stack([*(np.broadcast_to(axis, x.shape) for axis in unit), *turns], axis=2)
-
-
-def _times_stiffness(model: SolidModel, T: Array) -> Array:
-    """K T, with the free stiffness."""
-    K = stiffness_matrix(model)
-    u, f = K.createVecs()
-    result = np.empty_like(T)
-    for k in range(T.shape[1]):
-        u.array[:] = T[:, k]
-        K.mult(u, f)
-        result[:, k] = f.array_r
-    K.destroy()
-    return result
 
 
 def _add_springs(model: SolidModel, K: PETSc.Mat, R: Array) -> None:

@@ -12,7 +12,7 @@ from scipy.sparse.linalg import eigsh
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "fe_models"))
 
-from solids import body_of, model_of, write_solid
+from solids import body_of, mass_matrix, model_of, write_solid
 
 from ffrobot.fe_models.beam.link import beam_modal_body
 from ffrobot.fe_models.link_file import read_link
@@ -75,7 +75,7 @@ def test_nafems_fv52(tmp_path):
         edges = (np.abs(y + 0.5) < 1e-9) & ((np.abs(x * (x - 10)) < 1e-6) | (np.abs(np.abs(z) - 5) < 1e-9))
         free = np.setdiff1d(np.arange(3 * model.owned), 3 * np.flatnonzero(edges) + 1)
         K = symmetric(stiffness_matrix(model))[free][:, free]
-        M = sp.kron(model.mass.csr, sp.eye(3), format="csr")[free][:, free]
+        M = mass_matrix(model)[free][:, free]
         omega2 = eigsh(K, 10, M, sigma=-1e3, return_eigenvectors=False)
         found.append(np.sqrt(np.sort(omega2)[3:]) / (2 * np.pi))
     coarse, fine = found
@@ -99,7 +99,7 @@ def test_nafems_fv41(tmp_path):
     turned = sp.block_diag([[[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]] for a in theta], "csr")
     sides = np.flatnonzero(np.abs(theta) > 0.49 * angle)
     free = np.setdiff1d(np.arange(3 * model.owned), 3 * sides + 2)
-    matrices = symmetric(stiffness_matrix(model)), sp.kron(model.mass.csr, sp.eye(3), format="csc")
+    matrices = symmetric(stiffness_matrix(model)), mass_matrix(model)
     K, M = ((turned.T @ of @ turned).tocsc()[free][:, free] for of in matrices)
     omega2 = np.sort(eigsh(K, 6, M, sigma=-1e4, return_eigenvectors=False))
     expected = [243.53, 377.41, 394.11, 397.72, 405.28]

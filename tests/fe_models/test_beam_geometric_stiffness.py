@@ -162,8 +162,8 @@ def test_work_of_every_load_is_that_on_the_exact_motion(tmp_path, theory, condit
     link = link_of(tmp_path, theory, condition)
     stations = lagrange(np.linspace(0.0, L, 5), 3)
     shapes = shapes_of(theory, condition)
-    K = geometric_stiffness(link, stations, shapes.at(stations.x), PLACES)
-    assert set(K) == set(unit_load_names(PLACES))
+    matrices = geometric_stiffness(link, stations, shapes.at(stations.x), PLACES)
+    K = dict(zip(unit_load_names(PLACES), matrices, strict=True))
     x = np.linspace(0.0, L, 161)
     for p in np.random.default_rng(1).normal(size=(2, 3)):
         expected = works(shapes, p, theory, condition, x)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from scipy.linalg import eigh
-from solids import body_of, model_of, write_solid
+from solids import body_of, mass_matrix, model_of, write_solid
 
 from ffrobot.common.errors import SolveError
 from ffrobot.common.locks import this_process
@@ -122,7 +122,7 @@ def clamped_at_root(path):
     indptr, columns, values = stiffness_matrix(model).convert("aij").getValuesCSR()
     upper = sp.triu(sp.csr_matrix((values, columns, indptr)))
     K = (upper + sp.triu(upper, 1).T).tocsr()
-    return (A[free][:, free] for A in (K, sp.kron(model.mass.csr, sp.eye(3), format="csr")))
+    return (A[free][:, free] for A in (K, mass_matrix(model)))
 
 
 def test_factors_in_files(tmp_path, monkeypatch, cache):
