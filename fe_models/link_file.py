@@ -7,7 +7,7 @@ from math import isclose
 import numpy as np
 
 from ..common.errors import InputError
-from ..common.validation import validate
+from ..common.validation import Record, validate
 from ..mesh.records import RectangleSection, SectionRecord, SolidGeometry, TubeSection, extents
 from .beam.section_stress import contains
 from .link_records.families import DEFAULT_COUNT, FAMILIES
@@ -43,8 +43,7 @@ def read_link(source: LinkSource) -> Link:
 
 def _beam_geometry(link: BeamLink) -> Slips:
     geometry = link.geometry
-    if (geometry.section is None) == (geometry.segment is None):
-        yield "geometry", "either section or [[geometry.segment]]", _both_or_neither(geometry.section)
+    yield from _one_of("geometry", geometry, "section", "segment", "[[geometry.segment]]")
     ends = [segment.until for segment in geometry.segment or ()]
     if any(after - before <= 1e-9 * geometry.length for before, after in pairwise([0.0, *ends])):
         yield "geometry.segment", "ascending values of until, apart by more than 1e-9 of the length", ends
@@ -68,8 +67,7 @@ def _section(record: SectionRecord | None) -> Slips:
 def _beam_mesh(link: BeamLink) -> Slips:
     breakpoints, length = link.geometry.breakpoints, link.geometry.length
     mesh = link.mesh
-    if (mesh.elements is None) == (mesh.nodes is None):
-        yield "mesh", "either elements or nodes", _both_or_neither(mesh.elements)
+    yield from _one_of("mesh", mesh, "elements", "nodes")
     if mesh.elements is not None and mesh.elements < len(breakpoints) - 1:
         yield "mesh.elements", f"at least one per segment, {len(breakpoints) - 1}", mesh.elements
     if mesh.nodes is None:
@@ -124,14 +122,10 @@ def _same_places(link: Link) -> Slips:
 
 def _modes(link: Link) -> Slips:
     modes, damping = link.modes, link.damping
-    if modes.count is not None and modes.indices is not None:
-        yield "modes", "either count or indices", "both"
-    if modes.are_default and not modes.attachment_modes:
-        yield "modes", "either count or indices", "neither"
+    yield from _one_of("modes", modes, "count", "indices", needed=not modes.attachment_modes)
     if modes.indices and sorted(set(modes.indices)) != list(modes.indices):
         yield "modes.indices", "ascending numbers, each once", modes.indices
-    if damping.ratio is not None and damping.rayleigh is not None:
-        yield "damping", "either ratio or rayleigh", "both"
+    yield from _one_of("damping", damping, "ratio", "rayleigh", needed=False)
     if damping.of == "robot" and not isinstance(damping.ratio, float):
         given = damping.rayleigh if damping.ratio is None else damping.ratio
         yield "damping", 'one ratio, with of = "robot"', "none" if given is None else given
@@ -170,8 +164,7 @@ def _beam_stress(link: BeamLink) -> Slips:
 
 def _shape(link: SolidLink) -> Slips:
     geometry = link.geometry
-    if (geometry.section is None) == (geometry.file is None):
-        yield "geometry", "either section or file", _both_or_neither(geometry.section)
+    yield from _one_of("geometry", geometry, "section", "file")
     yield from _section(geometry.section)
     tip = geometry.tip_section
     if tip is not None and (
@@ -206,8 +199,7 @@ def _holes(geometry: SolidGeometry) -> Slips:
 
 def _solid_mesh(link: SolidLink) -> Slips:
     geometry, mesh = link.geometry, link.mesh
-    if mesh.size is not None and mesh.divisions is not None:
-        yield "mesh", "either size or divisions", "both"
+    yield from _one_of("mesh", mesh, "size", "divisions", needed=False)
     plain = isinstance(geometry.section, RectangleSection) and geometry.section.wall is None and not geometry.hole
     if mesh.divisions is not None and not plain:
         yield "mesh.divisions", "a box, of one section or tapered, for a structured mesh", "another shape"
@@ -221,8 +213,8 @@ def _solid_interfaces(link: SolidLink) -> Slips:
     yield from _names(link)
     for interface in link.interface:
         key = f"interface.{{}} of {interface.name}"
-        if interface.group is not None and interface.position is not None:
-            yield key.format("group"), "either group or position", "both"
+        is_end = interface.name in ("root", "tip")
+        yield from _one_of(key.format("position"), interface, "group", "position", needed=not is_end)
         if interface.normal is not None and not isinstance(interface.position, tuple):
             yield key.format("normal"), "it only with a position of three numbers", interface.position
         if isinstance(interface.position, tuple) and interface.normal is None:
@@ -236,8 +228,6 @@ def _solid_interfaces(link: SolidLink) -> Slips:
         if is_supported and interface.coupling == "mean" and link.coupling == "rigid":
             expected = '"rigid", or coupling = "mean" in [reference], which holds this face'
             yield key.format("coupling"), expected, '"mean"'
-        if interface.group is None and interface.position is None and interface.name not in ("root", "tip"):
-            yield key.format("position"), "either group or position", "neither"
 
 
 def _solid_materials(link: SolidLink) -> Slips:
@@ -254,8 +244,7 @@ def _surface_patches(link: SolidLink) -> Slips:
     patches = link.surface_patch
     if patches is None:
         return
-    if (patches.count is None) == (patches.centers is None):
-        yield "surface_patch", "either count or centers", _both_or_neither(patches.count)
+    yield from _one_of("surface_patch", patches, "count", "centers")
     section = link.geometry.section
     if not isinstance(section, RectangleSection) or link.geometry.tip_section is not None:
         yield "surface_patch", "a rectangular section without taper to lie on", "another shape"
@@ -270,5 +259,8 @@ def _surface_patches(link: SolidLink) -> Slips:
         yield "surface_patch", "patches that do not overlap", edges
 
 
-def _both_or_neither(value: object) -> str:
-    return "neither" if value is None else "both"
+def _one_of(key: str, record: Record, first: str, second: str, words: str = "", needed: bool = True) -> Slips:
+    """Both of two keys, the second of which may have other `words`, or neither where one is `needed`."""
+    given = [getattr(record, name) is not None for name in (first, second)]
+    if all(given) or (needed and not any(given)):
+        yield key, f"either {first} or {words or second}", "both" if all(given) else "neither"

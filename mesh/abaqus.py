@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from ..common.arrays import Integers
 from ..common.errors import InputError
-from .abaqus_deck import Deck, Instance, Keyword, Sets
+from .abaqus_deck import Deck, Keyword, Sets
 from .cells import in_gmsh_order
 from .included import number_of
 from .source import PointMass, RawMesh, left_out
@@ -46,23 +46,24 @@ class _Assembled:
 
     def __init__(self, deck: Deck) -> None:
         self.deck = deck
-        self.scopes = {"": Instance(deck.assembly), **deck.instances}
+        self.scopes = {"": deck.assembly, **deck.instances}
         self.node: dict[str, dict[int, int]] = {}
         self.solid: dict[str, dict[int, int]] = {}
         count = cells = 0
         for name, instance in self.scopes.items():
-            self.node[name] = {number: count + k for k, number in enumerate(instance.scope.nodes)}
-            count += len(instance.scope.nodes)
-            by_kind = sorted(instance.scope.solids.items(), key=lambda item: item[1][0])
-            instance.scope.solids = dict(by_kind)
+            self.node[name] = {number: count + k for k, number in enumerate(instance.nodes)}
+            count += len(instance.nodes)
+            by_kind = sorted(instance.solids.items(), key=lambda item: item[1][0])
+            instance.solids = dict(by_kind)
             self.solid[name] = {number: cells + k for k, (number, _) in enumerate(by_kind)}
             cells += len(by_kind)
-        self.points = np.concatenate([instance.points() for instance in self.scopes.values()])
+        nodes = ((one.place, np.array(list(one.nodes.values())).reshape(-1, 3)) for one in self.scopes.values())
+        self.points = np.concatenate([place.points(own) for place, own in nodes])
 
     def mesh(self) -> RawMesh:
         cells: list[tuple[str, list[int]]] = []
         for name, instance in self.scopes.items():
-            for number, (kind, nodes) in instance.scope.solids.items():
+            for number, (kind, nodes) in instance.solids.items():
                 cells.append((kind, [self._node(name, node, f"element {number}") for node in nodes]))
         same, remarks = self._tied()
         remarks += self._left_out()
@@ -87,7 +88,7 @@ class _Assembled:
             place = self.solid.get(instance, {}).get(number)
             if place is not None:
                 members.setdefault(name, []).append(place)
-            elif number not in self.scopes[instance].scope.others:
+            elif number not in self.scopes[instance].others:
                 raise InputError(f"*ELSET {name}{scope}: expected existing elements", f"element {number}")
         return {name: [np.array(cells, dtype=np.int64)] for name, cells in members.items()}
 
@@ -96,7 +97,7 @@ class _Assembled:
         for name, scope, instance, number in self._members("nsets"):
             sets.setdefault(name, []).append(self._node(instance, number, f"*NSET {name}{scope}"))
         for own, one in self.scopes.items():
-            for keyword in one.scope.faces.values():
+            for keyword in one.faces.values():
                 if nodes := self._surface_node_list(own, keyword):
                     sets.setdefault(keyword.options["NAME"], []).extend(nodes)
         return {name: np.unique(np.array(nodes, dtype=np.int64)) for name, nodes in sets.items()}
@@ -104,7 +105,7 @@ class _Assembled:
     def _members(self, kind: str) -> Iterator[tuple[str, str, str, int]]:
         """Name of each set as it is spelled, its scope in words, instance and number of its members."""
         for own, instance in self.scopes.items():
-            sets: Sets = getattr(instance.scope, kind)
+            sets: Sets = getattr(instance, kind)
             for key, name in sets.spelled.items():
                 for of, number, place in sets.numbers(key):
                     if (of or own) not in self.scopes:
@@ -115,13 +116,13 @@ class _Assembled:
         """Sides of solids by *SURFACE, and surface elements by set."""
         faces: dict[str, list[Integers]] = {}
         for own, instance in self.scopes.items():
-            for keyword in instance.scope.faces.values():
+            for keyword in instance.faces.values():
                 corners = [face for face in self._sides(own, keyword) if face]
                 for size in {len(face) for face in corners}:
                     rows = np.array([face for face in corners if len(face) == size], dtype=np.int64)
                     faces.setdefault(keyword.options["NAME"], []).append(rows)
         for name, _, own, number in self._members("elsets"):
-            if (nodes := self.scopes[own].scope.surfaces.get(number)) is not None:
+            if (nodes := self.scopes[own].surfaces.get(number)) is not None:
                 row = [self._node(own, node, f"element {number}") for node in nodes]
                 faces.setdefault(name, []).append(np.array([row], dtype=np.int64))
         return faces
@@ -129,14 +130,14 @@ class _Assembled:
     def _sides(self, own: str, keyword: Keyword) -> Iterator[tuple[int, ...]]:
         if keyword.options.get("TYPE", "ELEMENT").upper() != "ELEMENT":
             return
-        sets = self.scopes[own].scope.elsets
+        sets = self.scopes[own].elsets
         for row, place in keyword.rows():
             if (side := _side(row)) is None:
                 continue
             for instance, number, _ in sets.meant(row[0], place):
                 if (instance or own) not in self.scopes:
                     raise InputError(f"{place}: expected an instance of the assembly", instance)
-                if (solid := self.scopes[instance or own].scope.solids.get(number)) is None:
+                if (solid := self.scopes[instance or own].solids.get(number)) is None:
                     continue
                 for corners in _SIDES.get(_CORNERS.get(solid[0], 0), [])[int(side[1]) - 1 : int(side[1])]:
                     yield tuple(self._node(instance or own, solid[1][corner], place) for corner in corners)
@@ -145,7 +146,7 @@ class _Assembled:
         """Which node each node is once tied surfaces share theirs, and what to say of it."""
         same, remarks = np.arange(len(self.points)), list[str]()
         used = np.unique([
-            self.node[name][node] for name, one in self.scopes.items() for _, nodes in one.scope.solids.values()
+            self.node[name][node] for name, one in self.scopes.items() for _, nodes in one.solids.values()
             for node in nodes if node in self.node[name]
         ]).astype(np.int64)  # fmt: skip
         for tie in self.deck.ties:
@@ -190,7 +191,7 @@ class _Assembled:
         """The nodes of a surface of sides of solids, or of nodes; None where the deck has no such surface."""
         of, _, short = name.strip("\"'").upper().rpartition(".")
         for own, instance in self.scopes.items():
-            keyword = instance.scope.faces.get(short)
+            keyword = instance.faces.get(short)
             if keyword is None or (of and of != own):
                 continue
             nodes = [node for face in self._sides(own, keyword) for node in face]
@@ -201,7 +202,7 @@ class _Assembled:
     def _surface_node_list(self, own: str, keyword: Keyword) -> list[int]:
         if keyword.options.get("TYPE", "").upper() != "NODE":
             return []
-        sets = self.scopes[own].scope.nsets
+        sets = self.scopes[own].nsets
         rows = [(place, sets.meant(row[0], place)) for row, place in keyword.rows()]
         return [self._node(of or own, node, place) for place, members in rows for of, node, _ in members]
 
@@ -210,18 +211,18 @@ class _Assembled:
             value = next((number_of(row[0], place) for row, place in keyword.rows()), 0.0)
             name = keyword.options.get("ELSET", "").upper()
             for own, instance in self.scopes.items():
-                sets = instance.scope.elsets
+                sets = instance.elsets
                 for of, number, _ in sets.numbers(name) if name in sets.members else ():
-                    node = self.scopes[of or own].scope.masses.get(number)
+                    node = self.scopes[of or own].masses.get(number)
                     if node is not None:
                         place = self._node(of or own, node, f"element {number}")
                         yield PointMass(f"{keyword}, element {number}", value, self.points[place])
 
     def _left_out(self) -> Iterator[str]:
-        others = Counter(kind for one in self.scopes.values() for kind in one.scope.others.values())
+        others = Counter(kind for one in self.scopes.values() for kind in one.others.values())
         yield from left_out(others, [f"*{name}" for name, count in self.deck.not_read.items() if count])
         for one in self.scopes.values():
-            for keyword in one.scope.faces.values():
+            for keyword in one.faces.values():
                 # Of nodes, or of sides of solids; sides of shells are faces by their set.
                 of_nodes, combined = keyword.options.get("TYPE", "").upper() == "NODE", "COMBINE" in keyword.options
                 rows = [row for row, _ in keyword.rows() if not of_nodes]

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..common.arrays import Array
 from ..common.errors import InputError
 from .frames import GLOBAL, Frame
 from .included import Line, included, lines_of, number_of, whole_of
@@ -188,11 +187,13 @@ _OF_THE_LINK = (
 class Scope:
     """Content of a part, an instance or the assembly: nodes and elements by number, and sets.
 
-    `nodes` are coordinates in the unit of the deck, `solids` (type, nodes), `surfaces` corners, `others` the type of
+    `frame` is that of *SYSTEM, `place` where an instance is in the assembly. `nodes` are coordinates in the unit of
+    the deck, `solids` (type, nodes), `surfaces` corners, `others` the type of
     all that are no solids, `masses` the node of each of type MASS.
     """
 
     frame: Frame = GLOBAL
+    place: Frame = GLOBAL
     nodes: dict[int, tuple[float, float, float]] = field(default_factory=dict)
     solids: dict[int, tuple[str, tuple[int, ...]]] = field(default_factory=dict)
     surfaces: dict[int, tuple[int, ...]] = field(default_factory=dict)
@@ -204,7 +205,7 @@ class Scope:
 
     def copy(self) -> Scope:
         """One of the same content, which can be added to."""
-        return replace(self, **{name: of.copy() for name, of in vars(self).items() if name != "frame"})
+        return replace(self, **{name: of.copy() for name, of in vars(self).items() if name not in ("frame", "place")})
 
     def read(self, keyword: Keyword) -> bool:
         """Read the mesh data of a `keyword`; returns whether it has any."""
@@ -308,52 +309,30 @@ def _of_length(keyword: Keyword, length: int) -> Iterator[tuple[list[str], str]]
         raise InputError(f"{begin}: expected {length - 1} nodes of an element", len(entries) - 1)
 
 
-@dataclass
-class Instance:
-    """A part in the assembly: `place` of its keyword, turned by `rotation` about `center` after it has been `moved`.
-
-    `moved` and `center` (3,) have the unit of the deck.
-    """
-
-    scope: Scope
-    place: str = ""
-    moved: Array = field(default_factory=lambda: np.zeros(3))
-    center: Array = field(default_factory=lambda: np.zeros(3))
-    rotation: Rotation = field(default_factory=Rotation.identity)
-
-    @classmethod
-    def of(cls, keyword: Keyword, parts: dict[str, Scope]) -> Instance:
-        """Read *INSTANCE and its data lines: a translation, then a rotation about an axis through two points."""
-        name = keyword.option("PART")
-        if name.upper() not in parts:
-            raise InputError(f"{keyword}: expected PART= one of {', '.join(parts) or 'none'}", name)
-        part = parts[name.upper()]
-        own = part.copy()
-        rows = [([number_of(entry or "0", place) for entry in row], place) for row, place in keyword.rows()]
-        for sets, option, members in (
-            (own.nsets, "NSET", [*own.nodes]),
-            (own.elsets, "ELSET", [*own.solids, *own.others]),
-        ):
-            if whole := keyword.options.get(option):
-                sets.add(whole, [("", number, str(keyword)) for number in members])
-        instance = cls(own, str(keyword))
-        if len(rows) > 2 or (rows and len(rows[0][0]) > 3):
-            raise InputError(f"{keyword}: expected a line of 3 numbers (translation) and one of 7 (rotation) at most")
-        if rows:
-            instance.moved = np.array([*rows[0][0], 0.0, 0.0, 0.0][:3])
-        if len(rows) > 1:
-            values, place = rows[1]
-            axis = np.subtract(values[3:6], values[:3]) if len(values) == 7 else np.zeros(3)
-            if not np.linalg.norm(axis) > 0:
-                raise InputError(f"{place}: expected two points on an axis and an angle", values)
-            instance.center = np.array(values[:3])
-            instance.rotation = Rotation.from_rotvec(np.radians(values[6]) * axis / np.linalg.norm(axis))
-        return instance
-
-    def points(self) -> Array:
-        """Return the nodes (p, 3) of the instance in the assembly, in the deck's unit."""
-        own = np.array(list(self.scope.nodes.values()), dtype=np.float64).reshape(-1, 3) + self.moved
-        return self.center + self.rotation.apply(own - self.center) if len(own) else own
+def _instance(keyword: Keyword, parts: Mapping[str, Scope]) -> Scope:
+    """Read *INSTANCE and its data lines: a translation, then a rotation about an axis through two points."""
+    name = keyword.option("PART")
+    if name.upper() not in parts:
+        raise InputError(f"{keyword}: expected PART= one of {', '.join(parts) or 'none'}", name)
+    own = parts[name.upper()].copy()
+    rows = [([number_of(entry or "0", place) for entry in row], place) for row, place in keyword.rows()]
+    for sets, option, members in (
+        (own.nsets, "NSET", [*own.nodes]),
+        (own.elsets, "ELSET", [*own.solids, *own.others]),
+    ):
+        if whole := keyword.options.get(option):
+            sets.add(whole, [("", number, str(keyword)) for number in members])
+    if len(rows) > 2 or (rows and len(rows[0][0]) > 3):
+        raise InputError(f"{keyword}: expected a line of 3 numbers (translation) and one of 7 (rotation) at most")
+    moved, turn = np.array([*rows[0][0], 0.0, 0.0, 0.0][:3]) if rows else np.zeros(3), np.eye(3)
+    if len(rows) > 1:
+        values, place = rows[1]
+        axis = np.subtract(values[3:6], values[:3]) if len(values) == 7 else np.zeros(3)
+        if not np.linalg.norm(axis) > 0:
+            raise InputError(f"{place}: expected two points on an axis and an angle", values)
+        turn = Rotation.from_rotvec(np.radians(values[6]) * axis / np.linalg.norm(axis)).as_matrix()
+        moved = values[:3] + turn @ (moved - values[:3])
+    return replace(own, place=Frame(moved, turn))
 
 
 class Deck:
@@ -362,7 +341,7 @@ class Deck:
     def __init__(self, path: Path) -> None:
         self.parts: dict[str, Scope] = {}
         self.assembly = Scope()
-        self.instances: dict[str, Instance] = {}
+        self.instances: dict[str, Scope] = {}
         self.ties: list[Keyword] = []
         self.masses: list[Keyword] = []
         self.not_read: Counter[str] = Counter()
@@ -388,12 +367,12 @@ class Deck:
                 self.not_read[keyword.name] += keyword.name not in _OF_THE_LINK
         if scope is not self.assembly:
             raise InputError("expected *END PART or *END INSTANCE", "the end of the file: it is cut off")
-        self.assembly.nsets.of_instances = {name: one.scope.nsets for name, one in self.instances.items()}
-        self.assembly.elsets.of_instances = {name: one.scope.elsets for name, one in self.instances.items()}
+        self.assembly.nsets.of_instances = {name: one.nsets for name, one in self.instances.items()}
+        self.assembly.elsets.of_instances = {name: one.elsets for name, one in self.instances.items()}
         if not self.instances and self.parts:
             if len(self.parts) > 1:
                 raise InputError("expected an *INSTANCE of each part", f"none of {', '.join(self.parts)}")
-            self.instances = {name: Instance(part) for name, part in self.parts.items()}
+            self.instances = dict(self.parts)
             self.unused.clear()
         self.unused -= {name for name in self.unused if not self.parts[name].solids}
 
@@ -411,4 +390,4 @@ class Deck:
         name = keyword.option("NAME").upper()
         if name in self.instances:
             raise InputError(f"{keyword}: expected instances with unique names", f"{name} again")
-        return self.instances.setdefault(name, Instance.of(keyword, self.parts)).scope
+        return self.instances.setdefault(name, _instance(keyword, self.parts))

@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..common.arrays import Array, Integers, as_floats
+from ..common.arrays import Array, Integers
 from ..common.structs import struct
 
 CellName = Literal["tetrahedron", "hexahedron"]
@@ -51,7 +51,7 @@ CELLS: dict[CellName, Cell] = {"tetrahedron": TETRAHEDRON, "hexahedron": HEXAHED
 # neighbors face to face.
 KUHN = np.array([[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]])
 
-# gmsh's numbers of element types: of volume elements, under the names that meshio uses, and the nodes of all of them.
+# gmsh's numbers of types of volume elements, under the names that meshio uses.
 VOLUME_ELEMENTS = {
     4: "tetra",
     11: "tetra10",
@@ -66,11 +66,6 @@ VOLUME_ELEMENTS = {
     18: "wedge15",
     19: "pyramid13",
 }
-GMSH_NODES = {
-    1: 2, 2: 3, 3: 4, 4: 4, 5: 8, 6: 6, 7: 5, 8: 3, 9: 6, 10: 9, 11: 10, 12: 27, 13: 18, 14: 14, 15: 1, 16: 8, 17: 20,
-    18: 15, 19: 13, 20: 9, 21: 10, 22: 12, 23: 15, 24: 15, 25: 21, 26: 4, 27: 5, 28: 6, 29: 20, 30: 35, 31: 56,
-}  # fmt: skip
-GMSH_CORNERS = {2: 3, 9: 3, 20: 3, 21: 3, 22: 3, 23: 3, 24: 3, 25: 3, 3: 4, 10: 4, 16: 4}  # of surface elements
 
 # VTK and meshio number nodes otherwise: edges of the hexahedron around the lower face, the upper face, then upright.
 _VTK_HEXAHEDRON_EDGES = [
@@ -137,7 +132,7 @@ def volume_and_center(nodes: Array, cell: CellName, degree: int) -> tuple[float,
         parts = np.linalg.det(jacobians(some, cell, degree, X)) * weights
         volume += float(parts.sum())
         moment += np.einsum("cv,cvi->i", parts @ values, some)
-    return volume, as_floats(moment / volume)
+    return volume, moment / volume
 
 
 def cell_quality(corners: Array, cell: CellName) -> Array:

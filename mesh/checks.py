@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from ..common.arrays import Array, Booleans
 from ..common.errors import InputError
 from .cells import KUHN, SLIVER, cell_quality, jacobians, reference_nodes, volume_and_center
-from .part_mesh import PartMesh, boundary_facets, facet_geometry, facet_keys, show
+from .part_mesh import PartMesh, boundary_facets, facet_geometry, show
 from .records import SolidGeometry
 
 # Smallest determinant of a curved cell's Jacobian relative to its largest.
@@ -82,19 +82,16 @@ def check_neighbours(part: PartMesh) -> None:
     sides, rows = facets.shape[1], np.arange(len(facets))[:, None]
     after, before = facets[rows, (smallest + 1) % sides], facets[rows, (smallest - 1) % sides]
     # Seen from the cells on its two sides, the corners of a facet run round it in opposite senses.
-    keys = 2 * np.unique(facet_keys(facets, len(part.points)), return_inverse=True)[1].reshape(-1)
-    sided = keys + (after < before)[:, 0]
-    _, number, count = np.unique(sided, return_inverse=True, return_counts=True)
-    bad = count[number.reshape(-1)] > 1
+    sided = 2 * part.facet_numbers + (after < before)[:, 0]
+    bad = np.bincount(sided)[sided] > 1
     bad_cells = np.any(bad.reshape(len(part.cells), -1), axis=1)
     _refuse(part, bad_cells, "overlapping elements", "elements side by side")
 
 
 def check_connected(part: PartMesh) -> None:
     """Raise `InputError` unless the cells are connected by their faces."""
-    _, number = np.unique(facet_keys(part.cell_facets, len(part.points)), return_inverse=True)
     cell = np.repeat(np.arange(len(part.cells)), len(part.shape.facets))
-    incidence = sp.csr_matrix((np.ones(cell.size, dtype=np.int8), (cell, number)))
+    incidence = sp.csr_matrix((np.ones(cell.size, dtype=np.int8), (cell, part.facet_numbers)))
     count, piece = connected_components(incidence @ incidence.T, directed=False)
     if count == 1:
         return

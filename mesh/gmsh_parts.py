@@ -14,7 +14,6 @@ from typing import TypeVar, cast
 import gmsh
 import numpy as np
 
-from ..common.arrays import as_floats
 from ..common.errors import InputError, blaming_file
 from ..common.validation import Record
 from .checks import check_size
@@ -73,7 +72,7 @@ def mesh_step(file: Path, record: SolidMeshRecord, scale: float) -> Source:
         allow(MESHING + MESHING_CELL * check_size(size * metres, volume * metres**3))
         mesh_model(size, metres)
         source = source_from(extract_mesh())
-    part = source.part.moved(as_floats(source.part.points / declared))
+    part = source.part.moved(source.part.points / declared)
     remarks = (missing, *part.remarks) if faces < named else part.remarks
     return replace(source, part=replace(part, remarks=remarks))
 

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from scipy.optimize import least_squares
 
-from ..common.arrays import Array, Integers, as_floats
+from ..common.arrays import Array, Integers
 from ..common.errors import InputError, naming
 from ..common.structs import struct
 from .cells import volume_and_center
@@ -84,7 +84,7 @@ def inspect_part(file: Path, unit: Unit | None = None) -> Inspection:
         check_sound(part)
     if known is None:
         known = "mm" if np.ptp(part.points, axis=0).max() > LONGEST else "m"
-    part = part.moved(as_floats(METRES[known] * part.points))
+    part = part.moved(METRES[known] * part.points)
     boundary = PartBoundary.of(part)
     faces, face_of = boundary.smooth_faces, np.zeros(len(boundary.facets), dtype=np.int64)
     for k, face in enumerate(faces):
@@ -103,7 +103,7 @@ def inspect_part(file: Path, unit: Unit | None = None) -> Inspection:
         face_of=face_of,
         groups=[*part.regions, *source.facet_groups, *source.point_groups],
         remarks=part.remarks,
-        masses=[replace(mass, point=as_floats(METRES[known] * mass.point)) for mass in source.masses],
+        masses=[replace(mass, point=METRES[known] * mass.point) for mass in source.masses],
     )
 
 
@@ -134,11 +134,11 @@ def _cylinder(points: Array, face: SmoothFace) -> tuple[Array, Array, float] | N
 
     def axis_of(tilt: Array) -> Array:
         axis = face.axis + tilt @ across
-        return as_floats(axis / np.linalg.norm(axis))
+        return axis / np.linalg.norm(axis)
 
     def distances(x: Array) -> Array:
         off, axis = points - (face.center + size * x[2:4] @ across), axis_of(x[:2])
-        return as_floats(np.linalg.norm(off - np.outer(off @ axis, axis), axis=1))
+        return np.linalg.norm(off - np.outer(off @ axis, axis), axis=1)
 
     fit = least_squares(lambda x: distances(x) / size - x[4], [0.0, 0.0, 0.0, 0.0, 0.5], xtol=1e-15, ftol=1e-15)
     axis, radius = axis_of(fit.x[:2]), float(size * fit.x[4])
@@ -146,4 +146,4 @@ def _cylinder(points: Array, face: SmoothFace) -> tuple[Array, Array, float] | N
         return None
     on_axis = face.center + size * fit.x[2:4] @ across
     along = (points - on_axis) @ axis
-    return as_floats(on_axis + (along.min() + along.max()) / 2 * axis), axis, radius
+    return on_axis + (along.min() + along.max()) / 2 * axis, axis, radius

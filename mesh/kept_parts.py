@@ -9,6 +9,7 @@ import hashlib
 import json
 import zipfile
 from contextlib import suppress
+from dataclasses import fields
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -75,8 +76,9 @@ def kept_part(path: Path) -> PartMesh | None:
 
 def keep_part(path: Path, part: PartMesh) -> None:
     """Keep a mesh at `path`; a cache that cannot be written does no harm."""
-    arrays = {name: value for name, value in vars(part).items() if isinstance(value, np.ndarray)}
-    rest = {name: value for name, value in vars(part).items() if name not in arrays}
+    values = {field.name: getattr(part, field.name) for field in fields(part)}
+    arrays = {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
+    rest = {name: value for name, value in values.items() if name not in arrays}
     image = BytesIO()
     np.savez(image, **arrays, **{_REST: json.dumps(rest)})
     with suppress(SolveError):

@@ -18,7 +18,6 @@ import numpy as np
 
 from ..common.arrays import Integers
 from ..common.errors import InputError, blaming_file
-from .cells import GMSH_NODES, VOLUME_ELEMENTS
 from .gmsh_session import extract_mesh, gmsh_session, own_entities
 from .source import RawMesh
 
@@ -39,20 +38,15 @@ def read_msh(path: Path) -> RawMesh:
     with blaming_file(
         lambda error: f"expected a mesh in gmsh's format, found a damaged one: {' '.join(str(error).split())}"
     ):
-        version = float(content[len(_HEADER) :].split(maxsplit=1)[0])
-        if version >= 4:
-            return _by_gmsh(content)
-        content, partitions = _by_group(content)
-        raw = _by_gmsh(content)
-        remarks = [f"all cells are of partition {number}: others may be in separate files" for number in partitions]
-        return replace(raw, remarks=remarks) if len(remarks) == 1 else raw
+        return _by_gmsh(content, float(content[len(_HEADER) :].split(maxsplit=1)[0]) < 4)
 
 
-def _by_gmsh(content: bytes) -> RawMesh:
+def _by_gmsh(content: bytes, is_old: bool) -> RawMesh:
     with TemporaryDirectory() as folder, gmsh_session():
+        gmsh.option.setNumber("General.AbortOnError", 3)  # to tell what is wrong
+        content, partitions = _by_group(content) if is_old else (content, set())
         alone = Path(folder) / "mesh.msh"
         alone.write_bytes(content)
-        gmsh.option.setNumber("General.AbortOnError", 3)  # to tell what is wrong
         gmsh.merge(str(alone))
         elements = [tags for entity in own_entities() for tags in gmsh.model.mesh.getElements(*entity)[1]]
         for name, tags in (("Nodes", [gmsh.model.mesh.getNodes()[0]]), ("Elements", elements)):
@@ -60,7 +54,8 @@ def _by_gmsh(content: bytes) -> RawMesh:
             if announced != counted:
                 raise InputError(f"expected the {announced} {name.lower()} that ${name} announces", counted)
         _check_partitions(content)
-        return extract_mesh()
+        remarks = [f"all cells are of partition {number}: others may be in separate files" for number in partitions]
+        return replace(extract_mesh(), remarks=remarks if len(remarks) == 1 else ())
 
 
 def _check_partitions(content: bytes) -> None:
@@ -98,7 +93,7 @@ def _by_group(content: bytes) -> tuple[bytes, set[int]]:
     other = max((int(of.max(initial=0)) for of in groups), default=0) + 1
     partitions, written, count = set[int](), list[bytes](), 0
     for (kind, tags, nodes), of in zip(blocks, groups, strict=True):
-        if kind in VOLUME_ELEMENTS and tags.shape[1] > 3:
+        if gmsh.model.mesh.getElementProperties(kind)[1] == 3 and tags.shape[1] > 3:
             partitions.update(tags[:, 3].tolist())
         number = count + np.arange(1, len(nodes) + 1)[:, None]
         rows = [number, of, np.where(of, of, other), nodes]
@@ -133,10 +128,9 @@ def _text_elements(data: bytes) -> Iterator[tuple[int, Integers, Integers]]:
     if count != int(lines[0]):
         raise InputError(f"expected the {int(lines[0])} elements that $Elements announces", count)
     for (kind, tags, length), of in rows.items():
-        values = np.array(of, dtype=np.int64)
-        if length - 3 - tags != GMSH_NODES.get(kind):
-            known = GMSH_NODES.get(kind, "elements of a known type, not")
-            raise InputError(f"expected {known} nodes of elements of type {kind}", length - 3 - tags)
+        values, nodes = np.array(of, dtype=np.int64), gmsh.model.mesh.getElementProperties(kind)[3]
+        if length - 3 - tags != nodes:
+            raise InputError(f"expected {nodes} nodes of elements of type {kind}", length - 3 - tags)
         yield kind, values[:, 3 : 3 + tags], values[:, 3 + tags :]
 
 
@@ -145,9 +139,9 @@ def _binary_elements(section: bytes) -> Iterator[tuple[int, Integers, Integers]]
     at = done = 0
     while done < int(announced):
         kind, count, tags = (int(value) for value in np.frombuffer(data, dtype="<i4", count=3, offset=at))
-        if kind not in GMSH_NODES or count < 1 or tags < 0:
+        if count < 1 or tags < 0:
             raise InputError("expected elements of a known type", f"{count} of type {kind}")
-        width = 1 + tags + GMSH_NODES[kind]
+        width = 1 + tags + gmsh.model.mesh.getElementProperties(kind)[3]
         rows = np.frombuffer(data, dtype="<i4", count=count * width, offset=at + 12).reshape(count, width)
         at, done = at + 12 + 4 * count * width, done + count
         values = rows.astype(np.int64)

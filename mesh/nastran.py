@@ -324,7 +324,7 @@ class _Deck:
         """(3,) of a grid point, in the basic system."""
         if number not in self.grids:
             raise InputError(f"{asked}: expected existing grid points", number)
-        return np.asarray(self._points([self.grids[number]])[0])
+        return self._points([self.grids[number]])[0]
 
 
 def _add(cards: dict[int, Card], card: Card, number: int) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -60,6 +61,11 @@ class PartMesh:
         facets = self.shape.facets
         return self.corners[:, facets].reshape(-1, facets.shape[1])
 
+    @cached_property
+    def facet_numbers(self) -> Integers:
+        """Number (f,) of each of `cell_facets`: the same of those that cells share."""
+        return np.unique(facet_keys(self.cell_facets, len(self.points)), return_inverse=True)[1].reshape(-1)
+
     def tags_of(self, region: str) -> tuple[int, ...]:
         """Return the tags in `cell_tag` of all cells of a volume group."""
         return self.regions[region], *self.overlaps.get(region, ())
@@ -80,10 +86,9 @@ def facet_keys(facets: Integers, points: int) -> Integers:
 
 def boundary_facets(part: PartMesh) -> tuple[Integers, Integers]:
     """Return corners (b, 3 or 4) of facets of one cell only, counter-clockwise from outside, and their cells (b,)."""
-    facets = part.cell_facets
-    _, first, count = np.unique(facet_keys(facets, len(part.points)), return_index=True, return_counts=True)
-    alone = np.sort(first[count == 1])
-    return facets[alone], alone // len(part.shape.facets)
+    number = part.facet_numbers
+    alone = np.flatnonzero(np.bincount(number)[number] == 1)
+    return part.cell_facets[alone], alone // len(part.shape.facets)
 
 
 def facet_geometry(points: Array, facets: Integers) -> tuple[Array, Array, Array]:

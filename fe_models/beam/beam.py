@@ -9,7 +9,7 @@ Gauss points, which integrate products exactly, are the root of K: K = BᵀB but
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import scipy.sparse as sp
@@ -41,6 +41,10 @@ class FamilyModel:
     strain: sp.csr_matrix  # (s, m) the strains at Gauss points, scaled such that K = strainᵀ strain
     # for each of the rows U_X … R_Z that the family moves, (k, m): the field at k stations from x
     fields: Mapping[int, sp.csr_matrix]
+
+    def motion(self, places: Sequence[int]) -> Array:
+        """Rows (r, m) of the fields at the stations `places`, one station after the other: translation, rotation."""
+        return np.array([values[place].toarray()[0] for place in places for values in self.fields.values()])
 
 
 def family_model(link: BeamLink, family: Family, forms: BeamForms, stations: Array) -> FamilyModel:

@@ -126,7 +126,7 @@ def _modes(
     fixed, Z = dict(models), dict[Family, sp.csr_matrix]()
     if is_fixed:
         for family, model in models.items():
-            fixed[family], Z[family] = fixed_interfaces(model, family, places)
+            fixed[family], Z[family] = fixed_interfaces(model, places)
     wanted = None if link.modes.are_default else _wanted(link, fixed, path)
     modes = list[Mode]()
     for family, model in fixed.items():

@@ -12,7 +12,7 @@ from scipy.sparse.linalg import splu
 from ...common.arrays import Array
 from ...common.errors import SolveError
 from ..link_records.families import Family
-from ..modal_body.attachment_modes import COMPONENTS, Inertia, residual_modes
+from ..modal_body.attachment_modes import Inertia, residual_modes
 from ..modal_body.craig_bampton import in_order
 from ..modal_body.krylov_schur import KrylovSchur
 from .beam import FamilyModel
@@ -48,8 +48,8 @@ def attachment_modes(
     force times length. `twists_along`: whether torsion has the shape under a torque along the link, which bent links
     bear, too.
     """
-    rows = [row for row in COMPONENTS[family] if row in model.fields]
-    loads = [model.fields[row][place].toarray()[0] * (1.0 if row < R_X else length) for place in places for row in rows]
+    units = [1.0 if row < R_X else length for row in model.fields] * len(places)
+    loads = [size * load for size, load in zip(units, model.motion(places), strict=True)]
     if twists_along and family == "torsion":  # along the link as its inertia about the axis
         torque = model.M @ np.ones(model.M.shape[0])
         loads.append(torque * (length / torque.sum()))
@@ -58,7 +58,7 @@ def attachment_modes(
 
     def energy(U: Array) -> Array:
         strain = model.strain @ U
-        return np.asarray(strain.T @ strain)
+        return strain.T @ strain
 
     highest = float(np.diag(energy(X)).max(initial=0.0)) if X.shape[1] else np.inf
     inertia = Inertia(lambda U: model.M @ U, energy, np.asarray)
@@ -66,14 +66,13 @@ def attachment_modes(
     return modes_of(family, residual.omega2, residual.X)
 
 
-def fixed_interfaces(model: FamilyModel, family: Family, places: Sequence[int]) -> tuple[FamilyModel, sp.csr_matrix]:
+def fixed_interfaces(model: FamilyModel, places: Sequence[int]) -> tuple[FamilyModel, sp.csr_matrix]:
     """The eigenproblem of a family fixed at the stations `places`, and Z (m, free): x = Z y, C Z = 0.
 
     Of each interface coordinate, a row of C, the degree of freedom that it depends on most follows from the others.
     """
-    moved = [row for row in COMPONENTS[family] if row in model.fields]
-    rows = [model.fields[row][place].toarray()[0] for place in places for row in moved]
-    C = np.array([row for row in rows if np.any(row)]).reshape(-1, model.K.shape[0])
+    C = model.motion(places)
+    C = C[np.any(C, axis=1)]
     pivots = scipy.linalg.qr(C, mode="r", pivoting=True)[1][: len(C)]
     free = np.setdiff1d(np.arange(C.shape[1]), pivots)
     follow = sp.csr_matrix(-np.linalg.solve(C[:, pivots], C[:, free]))
@@ -146,4 +145,4 @@ class BeamFlexibility:
         return displacements
 
     def _solve(self, loads: Array) -> Array:
-        return np.asarray(self._scale * self._factors.solve(self._scale * loads))
+        return self._scale * self._factors.solve(self._scale * loads)

@@ -57,7 +57,7 @@ def _outline(section: SectionRecord, q: int) -> Array:
         corners = np.array([[1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]])
         s = np.arange(0.0, 1.0, 4 / q)[:, None]
         sides = [a + s * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
-        return np.asarray(np.concatenate(sides) * half)
+        return np.concatenate(sides) * half
     # Corner k at the angle of the rectangle's corner k, so that neighbors of other shape join without a twist.
     angle = 2 * np.pi * np.arange(q) / q - np.pi / 4
-    return np.asarray(0.5 * section.outer * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+    return 0.5 * section.outer * np.stack([np.cos(angle), np.sin(angle)], axis=1)

@@ -12,7 +12,7 @@ whole finite element model, however few eigenmodes there are (MacNeal, Comput. S
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 
 import numpy as np
 
@@ -38,6 +38,11 @@ COMPONENTS: Mapping[Family, tuple[int, ...]] = {
     "axial": (0,),
     "torsion": (3,),
 }
+
+
+def moving(families: Container[str]) -> list[int]:
+    """Components of loads at interfaces that move modes of these families, ascending."""
+    return sorted({k for family in FAMILIES if family in families for k in COMPONENTS[family]})
 
 
 @struct
@@ -120,7 +125,7 @@ def ascending(omega2: Array, family: Integers) -> Integers:
     order = np.argsort(omega2, kind="stable")
     steps = np.diff(omega2[order]) > ALIKE * omega2[order][1:]
     level = np.concatenate([[0], np.cumsum(steps)])[: len(order)]
-    return np.asarray(order[np.lexsort((family[order], level))])
+    return order[np.lexsort((family[order], level))]
 
 
 def uncoupled(K: Array, of: Integers) -> tuple[Array, Array, Integers]:

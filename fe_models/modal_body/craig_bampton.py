@@ -18,7 +18,7 @@ from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.structs import struct
 from ..link_records.families import FAMILIES, LOCAL
-from .attachment_modes import COMPONENTS, ModeSet, ascending, uncoupled
+from .attachment_modes import ModeSet, ascending, moving, uncoupled
 from .body import ModalBody
 from .parts import LEVI_CIVITA, Interface
 
@@ -68,13 +68,12 @@ def constraint_modes(omega2: Array, families: Sequence[str], interfaces: Mapping
 
     For bodies of other programs, whose modes say no more than ω² (n,), rad²/s², families, and how interfaces move.
     """
-    families = [str(family) for family in families]
-    moving = {k for family in FAMILIES if family in families for k in COMPONENTS[family]}
+    free = moving([str(family) for family in families])
     others = [at for name, at in interfaces.items() if name != ROOT]
     rows = np.concatenate([at.motion for at in others]) / np.sqrt(omega2)
     size = np.linalg.norm(rows, axis=1).reshape(-1, 2, 3)
     moved = (size > IMMOBILE * size.max(axis=(0, 2), keepdims=True)).ravel()
-    expected = np.tile([k in moving for k in range(6)], len(others))
+    expected = np.tile([k in free for k in range(6)], len(others))
     if not np.array_equal(moved, expected):
         return 0
     values = np.linalg.svd(rows[moved] / size.ravel()[moved, None], compute_uv=False)
@@ -89,9 +88,9 @@ def interface_coordinates(
 
     Raises `InputError` for interfaces so near to each other that they cannot move by themselves.
     """
-    moving = sorted({k for family in FAMILIES if family in families for k in COMPONENTS[family]})
-    names = [f"{name}/{AXES[k]}" for name in interfaces if name != ROOT for k in moving]
-    rows = np.concatenate([at.motion[moving] for name, at in interfaces.items() if name != ROOT])
+    free = moving(families)
+    names = [f"{name}/{AXES[k]}" for name in interfaces if name != ROOT for k in free]
+    rows = np.concatenate([at.motion[free] for name, at in interfaces.items() if name != ROOT])
     if len(rows) != static:
         raise InputError(
             f"craig-bampton: expected interfaces that can move freely ({', '.join(names)})",

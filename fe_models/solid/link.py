@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from dolfinx import fem
 
-from ...common.arrays import Array, Integers, as_floats
+from ...common.arrays import Array, Integers
 from ...common.errors import InputError
 
 # First of all that load dolfinx: mesh.compat sets PETSc up.
@@ -192,7 +192,7 @@ def _station_grid(link: SolidLink, solid: SolidMesh) -> tuple[Array, Integers]:
     length = link.geometry.length
     elements = int(np.clip(np.ceil(length / solid.size), *ELEMENTS))
     sections = [record.position for record in link.interface if isinstance(record.position, float)]
-    vertices = with_points(as_floats(np.linspace(0.0, length, elements + 1)), [0.5 * length, *sections])
+    vertices = with_points(np.linspace(0.0, length, elements + 1), [0.5 * length, *sections])
     inner = vertices[:-1, None] + np.diff(vertices)[:, None] * np.array([0.0, 1.0, 2.0]) / 3
     element = 3 * np.arange(vertices.size - 1)[:, None] + np.arange(4)
     return np.append(inner.ravel(), length), element

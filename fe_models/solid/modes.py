@@ -19,7 +19,7 @@ from ...common.arrays import Array, Integers
 from ...common.errors import InputError, quoted
 from ..link_records.families import DEFAULT_COUNT, FAMILIES, LOCAL, Family
 from ..link_records.link import SolidLink
-from ..modal_body.attachment_modes import COMPONENTS, Inertia, ModeSet, ascending, residual_modes
+from ..modal_body.attachment_modes import COMPONENTS, Inertia, ModeSet, ascending, moving, residual_modes
 from ..modal_body.craig_bampton import ROOT, in_order
 from ..modal_body.krylov_schur import KrylovSchur
 from ..modal_body.unit_loads import MOTIONS
@@ -171,7 +171,7 @@ def _turn(families: Sequence[Array], wanted: Sequence[str] | str) -> Array:
         weights = [w * (name in wanted) for w, name in zip(weights, FAMILIES, strict=True)]
     weights = [w / max(weights) if len(wanted) == 1 else w for w in weights]
     energy = sum(weight * rows.T @ rows for weight, rows in zip(weights, families, strict=True))
-    return np.asarray(np.linalg.eigh(energy)[1][:, ::-1])
+    return np.linalg.eigh(energy)[1][:, ::-1]
 
 
 def attachment_modes(
@@ -210,8 +210,8 @@ class FixedInterfaceFlexibility:
     """
 
     def __init__(self, flexibility: Flexibility, families: Sequence[Family], interfaces: Mapping[str, Array]) -> None:
-        moving = sorted({k for family in families for k in COMPONENTS[family]})
-        self._rows = np.concatenate([B[moving] for name, B in interfaces.items() if name != ROOT])
+        free = moving(families)
+        self._rows = np.concatenate([B[free] for name, B in interfaces.items() if name != ROOT])
         self._free, self.model = flexibility, flexibility.model
         self.rank = flexibility.rank - len(self._rows)
         self._shapes = flexibility @ np.ascontiguousarray(self._rows.T)
@@ -220,7 +220,7 @@ class FixedInterfaceFlexibility:
     def __matmul__(self, loads: Array) -> Array:
         """Displacements (3 owned, k), m, under loads (3 owned, k), N; collective."""
         U = self._free @ loads
-        return np.asarray(U - self._shapes @ (self._inverse @ self.model.total(self._rows @ U)))
+        return U - self._shapes @ (self._inverse @ self.model.total(self._rows @ U))
 
 
 def ritz_modes(model: SolidModel, both: ModeSet, count: int) -> ModeSet:

@@ -50,17 +50,21 @@ def modal_strains(space: FunctionSpace, cells: Integers, X: Array, modes: Array)
         J = jacobians(space.mesh, cells[part], X[part])
         basis = element.tabulate(1, X[part])[1:, :, :, 0].transpose(1, 0, 2)
         physical = np.linalg.solve(J.transpose(0, 2, 1), basis)
-        gradient = (physical @ values[nodes[cells[part]]]).reshape(-1, 3, 3, n)
-        for row, (i, j) in enumerate(VOIGT):
-            strains[part, row] = gradient[:, j, i] if i == j else gradient[:, j, i] + gradient[:, i, j]
+        strains[part] = _symmetric((physical @ values[nodes[cells[part]]]).reshape(-1, 3, 3, n))
     return strains
+
+
+def _symmetric(gradient: Array) -> Array:
+    """Strains (c, 6, …, k) ε_xx … 2ε_xy of displacement gradients (c, 3, …, 3, k), ∂u_i/∂x_j at [:, j, …, i]."""
+    g = np.moveaxis(gradient, -2, 2)
+    return np.stack([g[:, j, i] if i == j else g[:, j, i] + g[:, i, j] for i, j in VOIGT], axis=1)
 
 
 def jacobians(mesh: Mesh, cells: Integers, X: Array) -> Array:
     """Return J (q, 3, 3) = ∂x/∂X at reference coordinates X (q, 3) in each of `cells` (q,)."""
     shapes = coordinate_element(mesh).tabulate(1, X)[1:, :, :, 0]
     corners = mesh.geometry.x[geometry_nodes(mesh)[cells]]
-    return np.asarray(np.einsum("kqv,qvi->qik", shapes, corners))
+    return np.einsum("kqv,qvi->qik", shapes, corners)
 
 
 def locate(mesh: Mesh, points: Array, slack: float) -> tuple[Integers, Integers, Array]:
@@ -223,21 +227,19 @@ class Gradients:
         else:
             reference = _at_points(np.swapaxes(self.inverse, 2, 3), tensor.reshape(c, 3, q, -1))
         slopes = self.shapes.reshape(-1, self.shapes.shape[2]).T
-        return np.asarray(slopes @ reference.reshape(c, 3 * q, -1)).reshape(c, -1, 3, k)
+        return (slopes @ reference.reshape(c, 3 * q, -1)).reshape(c, -1, 3, k)
 
     @cached_property
     def strains(self) -> Array:
         """Strains (c, 6, q, k) ε_xx, ε_yy, ε_zz, 2ε_yz, 2ε_xz, 2ε_xy."""
-        g = self.values
-        rows = [g[:, j, :, i] if i == j else g[:, j, :, i] + g[:, i, :, j] for i, j in VOIGT]
-        return np.stack(rows, axis=1)
+        return _symmetric(self.values)
 
     def stresses(self, model: SolidModel) -> Array:
         """Return σ = C ε (c, 6, q, k) times `weights`, N·m."""
         strains = self.strains
         C = model.materials.C[model.materials.of_cell[self.cells]]
         stress = (C @ strains.reshape(*strains.shape[:2], -1)).reshape(strains.shape)
-        return np.asarray(stress * self.weights[:, None, :, None])
+        return stress * self.weights[:, None, :, None]
 
 
 def gradients(model: SolidModel, fields: Array) -> Iterator[Gradients]:
@@ -311,4 +313,4 @@ def geometric_stiffness(model: SolidModel, modes: Array, prestress: Array) -> Ar
             products = np.swapaxes(Phi[:, a], -1, -2) @ Phi[:, b]  # (c, q, n, n)
             total += (1 if a == b else 2) * stress[:, row].reshape(-1, loads).T @ products.reshape(-1, n * n)
     matrices = model.total(total).reshape(loads, n, n)
-    return np.asarray(0.5 * (matrices + matrices.transpose(0, 2, 1)))
+    return 0.5 * (matrices + matrices.transpose(0, 2, 1))

@@ -199,7 +199,7 @@ class Flexibility:
         U = self._factor.solve(np.where(self.clamped[:, None], 0.0, f))
         if self.W.shape[1]:
             U += self.W @ (self._S_inverse @ self.model.total(self.W.T @ f))
-        return U if self.B is None else np.asarray(U - self.R @ (self._BR_inverse @ self.model.total(self.B @ U)))
+        return U if self.B is None else U - self.R @ (self._BR_inverse @ self.model.total(self.B @ U))
 
     @property
     def rank(self) -> int:
@@ -215,11 +215,11 @@ class Flexibility:
         """Return reactions (6, k), N and N·m, along rows of B under `loads` (3 owned, k), N; none of rigid faces."""
         if self.B is None:
             return np.empty((0, loads.shape[1]))
-        return np.asarray(-self._BR_inverse.T @ self.model.total(self.R.T @ loads))
+        return -self._BR_inverse.T @ self.model.total(self.R.T @ loads)
 
     def supported(self, loads: Array) -> Array:
         """Pᵀ f (3 owned, k), N: `loads` with the forces of mean supports."""
-        return loads if self.B is None else np.asarray(loads + self.B.T @ self.reactions(loads))
+        return loads if self.B is None else loads + self.B.T @ self.reactions(loads)
 
 
 def _plate(x: Array, center: Array) -> Array:
