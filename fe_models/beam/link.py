@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import scipy.sparse as sp
 
 from ...common.arrays import Array
 from ...common.errors import InputError
@@ -14,13 +13,14 @@ from ..link_records.families import DEFAULT_COUNT, FAMILIES, Family
 from ..link_records.link import BeamLink
 from ..modal_body import Interface, ModalBody, PictureMesh, Stations
 from ..modal_body.attachment_modes import ascending
+from ..modal_body.craig_bampton import FixedInterfaceFlexibility
 from ..modal_body.lumped_masses import lump_weights, lumps
 from ..modal_body.measured import canonical_signs
 from ..modal_body.of_link import modal_body_of
 from .beam import BeamForms, FamilyModel, family_model
 from .invariants import geometric_stiffness, shape_integrals
 from .line import R_X, Functions, lagrange
-from .modes import Mode, attachment_modes, fixed_interfaces, lowest_modes, modes_of, ritz_modes
+from .modes import BeamFlexibility, Mode, attachment_modes, lowest_modes, modes_of, ritz_modes
 from .sections import section_outlines, shear_modulus
 from .stress import beam_stresses, segments
 
@@ -123,19 +123,14 @@ def _modes(
 ) -> tuple[list[Mode], list[Mode]]:
     """Eigenmodes, or what stands for them, and attachment modes; interfaces are at the stations `places`."""
     is_fixed = link.reference.condition == "craig-bampton"
-    fixed, Z = dict(models), dict[Family, sp.csr_matrix]()
-    if is_fixed:
-        for family, model in models.items():
-            fixed[family], Z[family] = fixed_interfaces(model, places)
-    wanted = None if link.modes.are_default else _wanted(link, fixed, path)
+    flexibility = {family: _flexibility(model, places if is_fixed else ()) for family, model in models.items()}
+    wanted = None if link.modes.are_default else _wanted(link, sum(one.rank for one in flexibility.values()), path)
     modes = list[Mode]()
-    for family, model in fixed.items():
-        count = min(wanted[-1] if wanted else DEFAULT_COUNT[family], model.K.shape[0])
-        modes += modes_of(family, *lowest_modes(model, count))
+    for family, model in models.items():
+        count = min(wanted[-1] if wanted else DEFAULT_COUNT[family], flexibility[family].rank)
+        modes += modes_of(family, *lowest_modes(model, count, flexibility[family]))
     modes = _by_frequency(modes)
     modes = [modes[number - 1] for number in wanted] if wanted else modes
-    if is_fixed:
-        modes = [mode._replace(x=Z[mode.family] @ mode.x) for mode in modes]
     if not link.modes.attachment_modes:
         return modes, []
     lower, higher = list[Mode](), list[Mode]()
@@ -147,6 +142,12 @@ def _modes(
             lower += of_family
         higher += static
     return _by_frequency(lower) if is_fixed else modes, _by_frequency(higher)
+
+
+def _flexibility(model: FamilyModel, fixed: Sequence[int]) -> BeamFlexibility | FixedInterfaceFlexibility:
+    """Under the supports, and with the stations `fixed`."""
+    free, rows = BeamFlexibility(model), model.motion(fixed)
+    return FixedInterfaceFlexibility(free, rows[np.any(rows, axis=1)]) if len(fixed) else free
 
 
 def _by_frequency(modes: Sequence[Mode]) -> list[Mode]:
@@ -178,10 +179,9 @@ def _element_boundaries(link: BeamLink) -> Array:
     return nodes
 
 
-def _wanted(link: BeamLink, models: Mapping[Family, FamilyModel], path: Path) -> Sequence[int]:
+def _wanted(link: BeamLink, available: int, path: Path) -> Sequence[int]:
     """Numbers of the modes asked for, from 1, ascending."""
     wanted = link.modes.indices or range(1, (link.modes.count or 0) + 1)
-    available = sum(model.K.shape[0] for model in models.values())
     if wanted[-1] > available:
         key = "count" if link.modes.indices is None else "indices"
         raise InputError(

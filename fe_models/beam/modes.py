@@ -1,11 +1,9 @@
 """Modes of a beam: the lowest of K x = ω² M x, attachment modes, and those with fixed interfaces (Craig–Bampton)."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-import scipy.linalg
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
@@ -13,7 +11,7 @@ from ...common.arrays import Array
 from ...common.errors import SolveError
 from ..link_records.families import Family
 from ..modal_body.attachment_modes import Inertia, residual_modes
-from ..modal_body.craig_bampton import in_order
+from ..modal_body.craig_bampton import FixedInterfaceFlexibility, in_order
 from ..modal_body.krylov_schur import KrylovSchur
 from .beam import FamilyModel
 from .line import R_X
@@ -37,6 +35,28 @@ class Mode(NamedTuple):
 def modes_of(family: Family, omega2: Array, X: Array) -> list[Mode]:
     """Modes of a family, one by one, from ω² (n,) in rad²/s² and degrees of freedom X (m, n)."""
     return [Mode(float(square), family, x) for square, x in zip(omega2, X.T, strict=True)]
+
+
+class BeamFlexibility:
+    """K⁻¹ (m, m); factors of K with a unit diagonal, since its entries are in N/m, N and N·m.
+
+    K = strainᵀ strain but for round-off, which refinement by the strains takes out.
+    """
+
+    def __init__(self, model: FamilyModel) -> None:
+        self._strain, self._scale = model.strain, 1.0 / np.sqrt(model.K.diagonal())[:, None]
+        self.rank = model.K.shape[0]
+        self._factors = splu((sp.diags(self._scale[:, 0]) @ model.K @ sp.diags(self._scale[:, 0])).tocsc())
+
+    def __matmul__(self, loads: Array) -> Array:
+        """Displacements under loads f (m, k)."""
+        displacements = self._solve(loads)
+        for _ in range(REFINEMENTS):
+            displacements += self._solve(loads - self._strain.T @ (self._strain @ displacements))
+        return displacements
+
+    def _solve(self, loads: Array) -> Array:
+        return self._scale * self._factors.solve(self._scale * loads)
 
 
 def attachment_modes(
@@ -66,28 +86,6 @@ def attachment_modes(
     return modes_of(family, residual.omega2, residual.X)
 
 
-def fixed_interfaces(model: FamilyModel, places: Sequence[int]) -> tuple[FamilyModel, sp.csr_matrix]:
-    """The eigenproblem of a family fixed at the stations `places`, and Z (m, free): x = Z y, C Z = 0.
-
-    Of each interface coordinate, a row of C, the degree of freedom that it depends on most follows from the others.
-    """
-    C = model.motion(places)
-    C = C[np.any(C, axis=1)]
-    pivots = scipy.linalg.qr(C, mode="r", pivoting=True)[1][: len(C)]
-    free = np.setdiff1d(np.arange(C.shape[1]), pivots)
-    follow = sp.csr_matrix(-np.linalg.solve(C[:, pivots], C[:, free]))
-    Z = sp.csr_matrix((np.ones(free.size), (free, np.arange(free.size))), shape=(C.shape[1], free.size))
-    Z += sp.csr_matrix((np.ones(len(C)), (pivots, np.arange(len(C)))), shape=(C.shape[1], len(C))) @ follow
-    fixed = replace(
-        model,
-        K=(Z.T @ model.K @ Z).tocsr(),
-        M=(Z.T @ model.M @ Z).tocsr(),
-        strain=model.strain @ Z,
-        fields={row: values @ Z for row, values in model.fields.items()},
-    )
-    return fixed, Z.tocsr()
-
-
 def ritz_modes(model: FamilyModel, family: Family, fixed: Array, static: Array) -> tuple[list[Mode], list[Mode]]:
     """Modes in the space of fixed-interface modes (m, n) and static shapes (m, r), M-orthonormal together.
 
@@ -100,17 +98,21 @@ def ritz_modes(model: FamilyModel, family: Family, fixed: Array, static: Array) 
     return modes[:count], modes[count:]
 
 
-def lowest_modes(model: FamilyModel, count: int) -> tuple[Array, Array]:
+def lowest_modes(
+    model: FamilyModel, count: int, flexibility: FixedInterfaceFlexibility | BeamFlexibility | None = None
+) -> tuple[Array, Array]:
     """The `count` lowest eigenpairs of K x = ω² M x: ω² (count,) ascending in rad²/s², X (m, count) with Xᵀ M X = I.
 
     Assembly rounds K's large entries, of order EI/h³; against the lowest ω² these errors grow as elements⁴. The
     Rayleigh quotient of the strains, which are differences of x once and not twice over (elements²), gives ω² without
-    them, and tells where a mesh is too fine for double precision. Raises `SolveError` where round-off errors spoil the
+    them, and tells where a mesh is too fine for double precision. `flexibility`: that with the interfaces fixed, where
+    they are. Raises `SolveError` where round-off errors spoil the
     modes.
     """
     K, M, strain = model.K, model.M, model.strain
     try:
-        X = KrylovSchur(BeamFlexibility(model), M, *K.shape, tolerance=TOLERANCE).lowest(count)
+        F = flexibility or BeamFlexibility(model)
+        X = KrylovSchur(F, M, K.shape[0], F.rank, tolerance=TOLERANCE).lowest(count)
     except (RuntimeError, np.linalg.LinAlgError):  # singular, or not finite
         raise SolveError(
             f"eigenproblem of size {K.shape[0]}: stiffness or mass is not positive definite in double precision; "
@@ -125,24 +127,3 @@ def lowest_modes(model: FamilyModel, count: int) -> tuple[Array, Array]:
         )
     order = np.argsort(omega2, kind="stable")
     return omega2[order], X[:, order]
-
-
-class BeamFlexibility:
-    """K⁻¹ (m, m); factors of K with a unit diagonal, since its entries are in N/m, N and N·m.
-
-    K = strainᵀ strain but for round-off, which refinement by the strains takes out.
-    """
-
-    def __init__(self, model: FamilyModel) -> None:
-        self._strain, self._scale = model.strain, 1.0 / np.sqrt(model.K.diagonal())[:, None]
-        self._factors = splu((sp.diags(self._scale[:, 0]) @ model.K @ sp.diags(self._scale[:, 0])).tocsc())
-
-    def __matmul__(self, loads: Array) -> Array:
-        """Displacements under loads f (m, k)."""
-        displacements = self._solve(loads)
-        for _ in range(REFINEMENTS):
-            displacements += self._solve(loads - self._strain.T @ (self._strain @ displacements))
-        return displacements
-
-    def _solve(self, loads: Array) -> Array:
-        return self._scale * self._factors.solve(self._scale * loads)

@@ -10,7 +10,8 @@ floating frame, all p with XᵀMX = I and K = diag(ω²), that span ψ and φ: a
 place of attachment modes. The way back, p = T (d, η), follows from what they do at interfaces.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -46,6 +47,30 @@ def in_order(K: Array, families: Sequence[str], is_static: Sequence[bool]) -> Mo
     order = ascending(squares, of_modes)
     order = order[np.argsort(residual[order], kind="stable")]
     return ModeSet(squares[order], tuple(names[of_modes[k]] for k in order), turn[:, order])
+
+
+ALONE = 1e-12  # eigenvalues of flexibility, each scaled to 1: less is of interfaces at one place
+
+
+class FixedInterfaceFlexibility:
+    """F − F Bᵀ (B F Bᵀ)⁻¹ B F: displacements under loads with interfaces fixed, which move by the `rows` B (k, m).
+
+    F is the `flexibility`, of a `rank`, under the supports of the root. Of vectors that several processes share each
+    has its own m entries; `total` sums an array over them.
+    """
+
+    def __init__(self, flexibility: Any, rows: Array, total: Callable[[Array], Array] = np.asarray) -> None:
+        self._free, self._rows, self._total = flexibility, rows, total
+        self.rank = flexibility.rank - len(rows)
+        self._shapes = flexibility @ np.ascontiguousarray(rows.T)
+        gram = total(rows @ self._shapes)
+        size = np.sqrt(np.outer(np.diag(gram), np.diag(gram)))
+        self._inverse = np.linalg.pinv(gram / size, rcond=ALONE, hermitian=True) / size
+
+    def __matmul__(self, loads: Array) -> Array:
+        """Displacements (m, k), m, under loads (m, k), N; collective."""
+        U = self._free @ loads
+        return U - self._shapes @ (self._inverse @ self._total(self._rows @ U))
 
 
 @struct

@@ -20,6 +20,8 @@ from ...mesh.structured import with_points
 from ..link_records.families import HOLDING_ROOT
 from ..link_records.link import SolidLink
 from ..modal_body import Interface, ModalBody, PictureMesh, Stations
+from ..modal_body.attachment_modes import moving
+from ..modal_body.craig_bampton import ROOT, FixedInterfaceFlexibility
 from ..modal_body.lumped_masses import loads_with_lumps, lump_weights, lumps
 from ..modal_body.measured import canonical_signs
 from ..modal_body.of_link import modal_body_of
@@ -27,7 +29,7 @@ from ..modal_body.unit_loads import unit_load_names
 from .elasticity import MassMatrix, MaterialMap, SolidModel, material_map, solid_model
 from .functionals import Averages, face_averages, outlined_patches, section_averages
 from .invariants import prestressed, shape_integrals, static_shapes, unit_loads
-from .modes import FixedInterfaceFlexibility, attachment_modes, ritz_modes, section_motion, wanted_modes
+from .modes import attachment_modes, ritz_modes, section_motion, wanted_modes
 from .stress import recovered_stresses
 from .supports import Flexibility, RigidFace
 
@@ -64,9 +66,10 @@ def solid_modal_body(link: SolidLink, path: Path, progress: Progress, *, remesh:
     shapes = static_shapes(flexibility, loads)
     progress(f"{link.name}: solving for the modes")
     fixed = link.reference.condition == "craig-bampton"
+    of_others = [B[moving(link.families)] for name, B in rows.items() if name != ROOT]
     modes = wanted_modes(
         link,
-        FixedInterfaceFlexibility(flexibility, link.families, rows) if fixed else flexibility,
+        FixedInterfaceFlexibility(flexibility, np.concatenate(of_others), model.total) if fixed else flexibility,
         mass,
         lambda X: section_motion(
             sections,

@@ -10,7 +10,7 @@ The largest names the family; where together they carry less than half, the mode
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -19,8 +19,8 @@ from ...common.arrays import Array, Integers
 from ...common.errors import InputError, quoted
 from ..link_records.families import DEFAULT_COUNT, FAMILIES, LOCAL, Family
 from ..link_records.link import SolidLink
-from ..modal_body.attachment_modes import COMPONENTS, Inertia, ModeSet, ascending, moving, residual_modes
-from ..modal_body.craig_bampton import ROOT, in_order
+from ..modal_body.attachment_modes import COMPONENTS, Inertia, ModeSet, ascending, residual_modes
+from ..modal_body.craig_bampton import FixedInterfaceFlexibility, in_order
 from ..modal_body.krylov_schur import KrylovSchur
 from ..modal_body.unit_loads import MOTIONS
 from .elasticity import MassMatrix, SolidModel
@@ -51,7 +51,7 @@ def wanted_modes(
     share of wanted ones so far. Raises `InputError` for more than the mesh has, or than can be found in reasonable
     time; `SolveError` where modes are lost in round-off.
     """
-    family, model = "all" if link.modes.family == "all" else link.families, flexibility.model
+    family, model = "all" if link.modes.family == "all" else link.families, mass.model
     numbers = np.array(link.modes.indices or range(1, (link.modes.count or 0) + 1)) - 1
     default, available = sum(DEFAULT_COUNT[one] for one in link.families), flexibility.rank
     needed = int(numbers[-1]) + 1 if numbers.size else default
@@ -200,27 +200,6 @@ def attachment_modes(
         static[family] = shapes[:, columns] * sizes, loads[:, columns] * sizes
     inertia = Inertia(lambda U: mass @ U, lambda U: strain_energy(model, U), model.total)
     return residual_modes(static, modes.X, float(modes.omega2.max()), inertia)
-
-
-class FixedInterfaceFlexibility:
-    """F − F Bᵀ (B F Bᵀ)⁻¹ B F: displacements under loads with all interfaces fixed that `families` move.
-
-    F is the `flexibility` under the supports of the root, B the rows of `interfaces` (6, 3 owned) but the root in the
-    directions of the families. Vectors contain this rank's own degrees of freedom.
-    """
-
-    def __init__(self, flexibility: Flexibility, families: Sequence[Family], interfaces: Mapping[str, Array]) -> None:
-        free = moving(families)
-        self._rows = np.concatenate([B[free] for name, B in interfaces.items() if name != ROOT])
-        self._free, self.model = flexibility, flexibility.model
-        self.rank = flexibility.rank - len(self._rows)
-        self._shapes = flexibility @ np.ascontiguousarray(self._rows.T)
-        self._inverse = np.linalg.inv(self.model.total(self._rows @ self._shapes))
-
-    def __matmul__(self, loads: Array) -> Array:
-        """Displacements (3 owned, k), m, under loads (3 owned, k), N; collective."""
-        U = self._free @ loads
-        return U - self._shapes @ (self._inverse @ self.model.total(self._rows @ U))
 
 
 def ritz_modes(model: SolidModel, both: ModeSet, count: int) -> ModeSet:
