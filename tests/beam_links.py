@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import numpy as np
+
 from ffrobot.fe_models.link import cached_modal_body
 from ffrobot.fe_models.link_source import LinkTable
 
@@ -48,3 +50,9 @@ def paper_link(condition="cantilever", count=10, family="in-plane-bending", *, a
 def modal_body(keys):
     """By stage 1, of the keys of a link file."""
     return cached_modal_body(LinkTable({"name": "link"} | keys, Path("link.toml"))).body
+
+
+def flexibility(body, name, other=None):
+    """(6, 6) displacement and rotation of an interface under unit force and moment at another one, or there."""
+    at, load = body.interfaces[name], body.interfaces[other or name]
+    return at.motion / np.diag(body.stiffness) @ load.motion.T

@@ -7,8 +7,7 @@ from scipy.optimize import brentq
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import make_link
 from ffrobot.fe_models.modal_body import Interface
-from ffrobot.fe_models.modal_body.lumped_masses import Lump, loads_with_lumps, with_lumped_masses
-from ffrobot.fe_models.modal_body.parts import Invariants
+from ffrobot.fe_models.modal_body.lumped_masses import Lump, attached_integrals, loads_with_lumps
 from ffrobot.mbs.model.body import from_modal_body
 from ffrobot.mbs.model.masses import with_payload
 
@@ -73,27 +72,17 @@ def lump():
 
 
 def test_integrals_are_those_of_material_points(lump):
-    zeros = Invariants(
-        mass=0.0,
-        first_moment=np.zeros(3),
-        second_moment=np.zeros((3, 3)),
-        S_bar=np.zeros((3, 4)),
-        I_bar=np.zeros((3, 3, 4)),
-        S_bar_kl=np.zeros((3, 3, 4, 4)),
-        J_spin=0.0,
-        h_spin=np.zeros(4),
-        S_spin=np.zeros((4, 4)),
-    )
-    found = with_lumped_masses(zeros, [lump])
+    at = lump.at
+    found = attached_integrals(lump.mass, at.position, lump.spread, at.translation, at.rotation)
     masses, offsets = cloud(lump)
     x = lump.at.position + offsets
     Phi = [lump.at.translation + np.cross(lump.at.rotation.T, offset).T for offset in offsets]
-    assert found.mass == pytest.approx(masses.sum())
-    np.testing.assert_allclose(found.first_moment, masses @ x, atol=1e-14)
-    np.testing.assert_allclose(found.second_moment, np.einsum("i,ik,il->kl", masses, x, x), atol=1e-14)
-    np.testing.assert_allclose(found.S_bar, np.einsum("i,ikn->kn", masses, Phi), atol=1e-14)
-    np.testing.assert_allclose(found.I_bar, np.einsum("i,ik,iln->kln", masses, x, Phi), atol=1e-13)
-    np.testing.assert_allclose(found.S_bar_kl, np.einsum("i,ikm,iln->klmn", masses, Phi, Phi), atol=1e-13)
+    assert found["mass"] == pytest.approx(masses.sum())
+    np.testing.assert_allclose(found["first_moment"], masses @ x, atol=1e-14)
+    np.testing.assert_allclose(found["second_moment"], np.einsum("i,ik,il->kl", masses, x, x), atol=1e-14)
+    np.testing.assert_allclose(found["S_bar"], np.einsum("i,ikn->kn", masses, Phi), atol=1e-14)
+    np.testing.assert_allclose(found["I_bar"], np.einsum("i,ik,iln->kln", masses, x, Phi), atol=1e-13)
+    np.testing.assert_allclose(found["S_bar_kl"], np.einsum("i,ikm,iln->klmn", masses, Phi, Phi), atol=1e-13)
 
 
 def test_inertia_loads_are_those_of_material_points(lump):

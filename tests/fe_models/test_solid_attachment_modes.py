@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from beam_links import rectangle, solid_link
+from beam_links import flexibility, rectangle, solid_link
 
 import ffrobot
 
@@ -15,12 +15,6 @@ def bar(condition="cantilever", count=4, family="in-plane-bending", interface=()
     keys = {"name": "bar", "modes": modes, "interface": list(interface)}
     link = solid_link(L, rectangle(0.02, 0.03), {"size": size}, E=E, nu=0.3, rho=7850.0, condition=condition, **keys)
     return ffrobot.make_link(link).body
-
-
-def flexibility(body, name, other=None):
-    places = body.interfaces[name], body.interfaces[other or name]
-    rows = [np.concatenate([at.translation, at.rotation]) for at in places]
-    return rows[0] / np.diag(body.stiffness) @ rows[1].T
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import re
 import h5py
 import numpy as np
 import pytest
+from beam_links import circle, link_keys, rectangle, solid_link, tube
 
 import ffrobot
 
@@ -120,10 +121,8 @@ def drawn_section(draw, size):
     height = size * draw.uniform(0.7, 1.4)
     shape = draw.choice(["rectangle", "circle", "tube"])
     if shape == "rectangle":
-        return {"shape": shape, "height": height, "width": height * draw.choice([1.0, draw.uniform(0.2, 4.0)])}
-    if shape == "circle":
-        return {"shape": shape, "diameter": height}
-    return {"shape": shape, "outer": height, "inner": height * draw.uniform(0.2, 0.9)}
+        return rectangle(height, height * draw.choice([1.0, draw.uniform(0.2, 4.0)]))
+    return circle(height) if shape == "circle" else tube(height, height * draw.uniform(0.2, 0.9))
 
 
 def drawn_beam(seed):
@@ -136,15 +135,10 @@ def drawn_beam(seed):
         ends = draw.uniform(0.2, 0.8) * length, length
         geometry["segment"] = [{"until": end, "section": drawn_section(draw, length * slenderness)} for end in ends]
     families = ["in-plane-bending", "out-of-plane-bending", "axial", "torsion"]
-    keys = {
+    material = {"E": 10 ** draw.uniform(9, 11.5), "rho": draw.uniform(900, 8000), "nu": draw.uniform(0, 0.45)}
+    keys = link_keys("beam", length, None, {"elements": draw.randint(3, 24)}, **material) | {
         "name": "link",
-        "material": {
-            "youngs_modulus": 10 ** draw.uniform(9, 11.5),
-            "density": draw.uniform(900, 8000),
-            "poissons_ratio": draw.uniform(0, 0.45),
-        },
         "geometry": geometry,
-        "mesh": {"elements": draw.randint(3, 24)},
         "model": {"theory": draw.choice(["euler-bernoulli", "timoshenko"])},
         "reference": {"condition": draw.choice(["cantilever", "simply-supported", "craig-bampton"])},
         "modes": {"family": draw.choice(["all", *families, draw.sample(families, 2)])},
@@ -166,33 +160,23 @@ def test_beams(seed):
     check(drawn_beam(seed))
 
 
-def solid(condition, size, mesh, section, **more):
-    return {
-        "name": "link",
-        "material": {"youngs_modulus": 7e10, "density": 2700.0, "poissons_ratio": 0.33},
-        "geometry": {"kind": "solid", "length": 10 * size, "section": section, **more.pop("geometry", {})},
-        "mesh": mesh,
-        "reference": {"condition": condition},
-        "modes": {"count": 3},
-        **more,
-    }
-
-
+MORE = {"name": "link", "modes": {"count": 3}}
 SOLIDS = {
-    "box of 0.2 mm": solid(
-        "craig-bampton",
-        2e-4,
+    "box of 0.2 mm": solid_link(
+        2e-3,
+        rectangle(2e-4, 1.4e-4),
         {"cell": "hexahedron", "order": 2, "divisions": [6, 1, 1]},
-        {"shape": "rectangle", "height": 2e-4, "width": 1.4e-4},
+        condition="craig-bampton",
         interface=[{"name": "cut", "position": 8e-4, "mass": 1e-7}],
         stress={"points": {"inside": [6e-4, 4e-5, 2e-5]}},
+        **MORE,
     ),
-    "hole in a thin bar that gmsh meshes": solid(
-        "cantilever",
-        3e-5,
+    "hole in a thin bar that gmsh meshes": solid_link(
+        3e-4,
+        rectangle(3e-5, 2.1e-5),
         {"order": 2, "size": 2.7e-5},
-        {"shape": "rectangle", "height": 3e-5, "width": 2.1e-5},
-        geometry={"hole": [{"position": 1.4e-4, "diameter": 1.2e-5}]},
+        hole=[{"position": 1.4e-4, "diameter": 1.2e-5}],
+        **MORE,
     ),
 }
 

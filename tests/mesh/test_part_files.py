@@ -153,28 +153,33 @@ def test_foreign_meshes(solid, mesh_part, tmp_path, ending, kind):
     assert face_area(part, "tip") == pytest.approx((1.3 if curved else 1.0) * VOLUME, rel=1e-6)
 
 
-@pytest.mark.parametrize(("kind", "compressed"), [("TETRA", ""), ("VOXEL", "ZLib"), ("TETRA", "LZ4")])
-def test_files_of_vtk_itself(solid, mesh_part, tmp_path, kind, compressed):
-    """What VTK 9 and ParaView write: version 5.1 in binary form, or XML with appended data, with data of points."""
-    pyvista = pytest.importorskip("pyvista")
+def by_vtk(grid, path, compressed=""):
+    """Write a grid as VTK 9 and ParaView do: version 5.1 in binary form, or XML with appended data."""
     from vtkmodules.vtkIOLegacy import vtkUnstructuredGridWriter
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
+    writer = vtkXMLUnstructuredGridWriter() if path.suffix == ".vtu" else vtkUnstructuredGridWriter()
+    if compressed:
+        getattr(writer, f"SetCompressorTypeTo{compressed}")()
+        writer.SetDataModeToAppended()
+    elif path.suffix == ".vtk":
+        writer.SetFileTypeToBinary()
+    writer.SetFileName(str(path))
+    writer.SetInputData(grid)
+    writer.Write()
+
+
+@pytest.mark.parametrize(("kind", "compressed"), [("TETRA", ""), ("VOXEL", "ZLib"), ("TETRA", "LZ4")])
+def test_files_of_vtk_itself(solid, mesh_part, tmp_path, kind, compressed):
+    """With data of points."""
+    pyvista = pytest.importorskip("pyvista")
     cell = "tetrahedron" if kind == "TETRA" else "hexahedron"
     box = structured_bar(cell)
     cells = box.cells if kind == "TETRA" else box.cells[:, [0, 1, 3, 2, 4, 5, 7, 6]]
     grid = pyvista.UnstructuredGrid({pyvista.CellType[kind]: cells}, box.points)
     grid.point_data["u"] = box.points / 7
-    writer = vtkXMLUnstructuredGridWriter() if compressed else vtkUnstructuredGridWriter()
     path = tmp_path / ("part.vtu" if compressed else "part.vtk")
-    if compressed:
-        getattr(writer, f"SetCompressorTypeTo{compressed}")()
-        writer.SetDataModeToAppended()
-    else:
-        writer.SetFileTypeToBinary()
-    writer.SetFileName(str(path))
-    writer.SetInputData(grid)
-    writer.Write()
+    by_vtk(grid, path, compressed)
     part = mesh_part(solid(file=path))
     assert integrate(part) == pytest.approx(VOLUME, rel=1e-6)
     assert not part.remarks
@@ -208,15 +213,10 @@ def test_cells_of_any_degree_of_vtk(solid, mesh_part, tmp_path, kind, bend):
 def test_hidden_cells_of_vtk_are_rejected(solid, mesh_part, tmp_path):
     """ParaView's blanking: meshio shows all cells, VTK's own reader the others."""
     pyvista = pytest.importorskip("pyvista")
-    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
-
     box = structured_bar("hexahedron")
     grid = pyvista.UnstructuredGrid({pyvista.CellType.HEXAHEDRON: box.cells}, box.points)
     grid.cell_data["vtkGhostType"] = np.repeat(np.array([0, 32], dtype=np.uint8), [30, 2])
-    writer = vtkXMLUnstructuredGridWriter()
-    writer.SetFileName(str(tmp_path / "part.vtu"))
-    writer.SetInputData(grid)
-    writer.Write()
+    by_vtk(grid, tmp_path / "part.vtu")
     with pytest.raises(InputError, match="2 cells that vtkGhostType hides"):
         mesh_part(solid(file=tmp_path / "part.vtu"))
 
