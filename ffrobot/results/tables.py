@@ -63,10 +63,11 @@ def placement_cells(results: Results, analysis: str) -> Iterator[Cells]:
     if criterion == "voltage":
         texts = [f"{volts(value)} V" for value in results[f"{group}/largest_voltage"]]
     by = {"voltage": "voltage", "estimate": "deviation of the tip"}
+    centers = [f"{x:.4g}" for x in results[f"{group}/best/centers"]]
     yield {
         "on": about["body"],
         "by": by.get(criterion, f"{about['measure']} reach"),
-        "centers (m)": ", ".join(f"{x:.4g}" for x in results[f"{group}/best/centers"]),
+        "centers (m)": ",\n".join(", ".join(centers[k : k + 4]) for k in range(0, len(centers), 4)),
         "optimum": texts[0],
         "evenly spaced": texts[1],
         "sets tried": f"{about['sets']}" + (" (evolution)" if about["method"] == "evolution" else ""),
