@@ -4,6 +4,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from io import BytesIO
 from itertools import chain, repeat
 from pathlib import Path
@@ -94,17 +95,12 @@ def _mp4_image(frames: Iterable[Frame]) -> bytes:
             "-pix_fmt", "yuv420p", "-crf", "20", "-movflags", "+faststart", "-bitexact", str(path),
         ]
         # fmt: on
-        with (Path(place) / "errors").open("w+b") as errors:
-            with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=errors, stderr=errors) as process:
-                assert process.stdin is not None
-                try:
-                    for frame in (first, *remaining):
-                        process.stdin.write(np.ascontiguousarray(frame).tobytes())
-                    process.stdin.close()
-                except BrokenPipeError:
-                    pass  # it has ended early, and said why
-            errors.seek(0)
-            said = errors.read().decode(errors="replace").strip().splitlines()
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+            assert process.stdin is not None
+            with suppress(BrokenPipeError):  # it has ended early, and said why
+                for frame in chain([first], remaining):
+                    process.stdin.write(frame.tobytes())
+            said = process.communicate()[1].decode(errors="replace").strip().splitlines()
         if process.returncode or not path.is_file():
             raise SolveError(f"ffmpeg failed: {said[-1] if said else 'no reason given'}")
         return path.read_bytes()

@@ -11,7 +11,6 @@ from ..common.meanings import LABELS, meaning
 from .joints import joint_coordinates
 
 if TYPE_CHECKING:
-    from ..common.arrays import Array
     from .file import Results
 
 TIME, SAMPLES = "time", "control/time"
@@ -20,38 +19,32 @@ TIME, SAMPLES = "time", "control/time"
 def labelled(results: Results, analysis: str, histories: Sequence[str]) -> Dataset:
     """All `histories` of an analysis, and the samples of a closed loop; see `Results.to_xarray`."""
     names = [name for name in histories if name != TIME]
-    if results.has(f"{analysis}/{SAMPLES}"):
+    is_sampled = results.has(f"{analysis}/{SAMPLES}")
+    if is_sampled:
         inside = results.names(f"{analysis}/control")
         names = [n for n in names if not n.startswith("control/")] + [f"control/{n}" for n in inside if n != TIME]
     coordinates: dict[str, Any] = {}
     variables: dict[str, Any] = {}
     for name in names:
-        _add(results, analysis, name, variables, coordinates)
-    for name in (TIME, SAMPLES):
-        if results.has(f"{analysis}/{name}"):
-            coordinates[name] = (name, results[f"{analysis}/{name}"], {"units": "s"})
+        values = results[f"{analysis}/{name}"]
+        dimensions = [SAMPLES if is_sampled and name.startswith("control/") else TIME]
+        if values.ndim == 2:
+            dimension, labels = _columns(results, analysis, name, values.shape[1])
+            if dimension in coordinates and list(coordinates[dimension][1]) != labels:
+                dimension = f"{dimension}, {name}"  # the same dimension with other labels
+            coordinates[dimension] = (dimension, labels)
+            dimensions.append(dimension)
+        else:
+            dimensions += [f"{name} {k}" for k in range(1, values.ndim)]
+        variables[name] = (dimensions, values, _about(results, name))
+    for name in (TIME, SAMPLES) if is_sampled else (TIME,):
+        coordinates[name] = (name, results[f"{analysis}/{name}"], {"units": "s"})
     about = {key: value for key, value in results.attributes(analysis).items() if not isinstance(value, bytes)}
-    return Dataset(
-        variables, coordinates, {"scene": str(results.attributes("/")["name"]), "analysis": analysis} | about
-    )
+    return Dataset(variables, coordinates, {"scene": results.name, "analysis": analysis} | about)
 
 
-def _add(results: Results, analysis: str, name: str, variables: dict[str, Any], coordinates: dict[str, Any]) -> None:
-    values = results[f"{analysis}/{name}"]
-    dimensions = [SAMPLES if name.startswith("control/") and results.has(f"{analysis}/{SAMPLES}") else TIME]
-    if values.ndim == 2:
-        dimension, labels = _columns(results, analysis, name, values)
-        if dimension in coordinates and list(coordinates[dimension][1]) != labels:
-            dimension = f"{dimension}, {name}"  # the same dimension with other labels
-        coordinates[dimension] = (dimension, labels)
-        dimensions.append(dimension)
-    else:
-        dimensions += [f"{name} {k}" for k in range(1, values.ndim)]
-    variables[name] = (dimensions, values, _about(results, name))
-
-
-def _columns(results: Results, analysis: str, name: str, values: Array) -> tuple[str, Sequence[Any]]:
-    count, part = values.shape[1], [*name.split("/"), name][1]
+def _columns(results: Results, analysis: str, name: str, count: int) -> tuple[str, Sequence[Any]]:
+    part = [*name.split("/"), name][1]
     known = meaning(name)
     columns = known.columns if known is not None and known.columns else name
     dimension, labels = columns.format(part), list(LABELS.get(columns, ())[:count])
