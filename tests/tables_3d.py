@@ -1,5 +1,7 @@
 """Tables of scenes as tests of all parts write them: rigid bodies, joints, a scene in 3D or in the plane."""
 
+import ffrobot
+
 ORIGIN = [0.0, 0.0, 0.0]
 DOWN = [0.0, 0.0, -9.81]
 X, Y, Z = [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]
@@ -32,3 +34,7 @@ def planar(bodies, joints, *analyses, gravity=(0.0, -9.81), **tables):
 def pin(name, inner, outer, **keys):
     """A revolute joint of a planar scene."""
     return joint(name, "revolute", inner, outer, **keys)
+
+
+def solved(tables):
+    return ffrobot.solve(ffrobot.make_scene(**tables))

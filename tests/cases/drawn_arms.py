@@ -100,27 +100,20 @@ def drawn_arm(seed, folder, *, stout=False):
         "gravity": _vector(rng, 5.0) if seed % 4 else [0.0, 0.0, -9.81],
         "payload": [{"point": tool, "mass": round(float(rng.uniform(0.05, 0.4)), 3)}],
     }  # fmt: skip
-    return posed(scene, (start, finish), tool, end, folder / f"arm{seed}.toml"), tool
-
-
-def posed(scene, postures, tool, end, path, tolerance=1e-6):
-    """The file of a scene whose motors alone carry the tool from the first to the second of two postures, as above.
-
-    Postures are angles by joint; with six joints the tool follows a pose, else a place.
-    """
-    scene |= {"initial": {"state": "static", "joints": postures[0]}, "analysis": [{"name": "s", "kind": "static"}]}
+    scene |= {"initial": {"state": "static", "joints": start}, "analysis": [{"name": "s", "kind": "static"}]}
+    path = folder / f"arm{seed}.toml"
     path.write_text(tomli_w.dumps(scene), encoding="utf-8")
     tree = prepare_scene(path, Watcher()).model.tree
     places = []
-    for posture in postures:
+    for posture in (start, finish):
         q = tree.at_rest({name: [value] for name, value in posture.items()})[None]
         at = tree_oracle.motion(tree, tree.section(tool, np.eye(3)), q, tree_oracle.frames(tree, q))
-        turn = Rotation.from_matrix(at.F[0]).as_euler("xyz").tolist() if len(posture) == 6 else []
+        turn = Rotation.from_matrix(at.F[0]).as_euler("xyz").tolist() if count == 6 else []
         places.append([round(x, 6) for x in (*at.r[0], *turn)])
     scene["trajectory"] = [{"name": "tool", "point": tool, "via": places, "duration": end}]
     scene["analysis"] = [
-        {"name": "exact", "kind": "motors-only", "end": end, "output_step": 0.005, "tolerance": tolerance},
+        {"name": "exact", "kind": "motors-only", "end": end, "output_step": 0.005, "tolerance": 1e-6},
         {"name": "again", "kind": "forward", "actuation": "exact", "apply": "joints", "tolerance": 1e-7},
     ]
     path.write_text(tomli_w.dumps(scene), encoding="utf-8")
-    return path
+    return path, tool

@@ -5,8 +5,8 @@ import pytest
 import scenes_in_3d
 from checkpoints import CASES
 from scipy.linalg import expm
+from tables_3d import solved
 
-import ffrobot
 from ffrobot.common.errors import InputError
 
 HOLD = {"name": "hold", "kind": "pcid", "end": 0.1, "output_step": 0.0005, "tolerance": 1e-10}
@@ -59,7 +59,7 @@ def test_arm_keeps_to_its_line():
     push = {axis: f"{0.5 * part}*where(t < 0.25, 0, 1)" for axis, part in zip("xyz", PUSH, strict=True)}
     loops = [held("follows", HOLDS, **keys)]
     loops.append(held("pushed", HOLDS, disturbance=[{"point": "fore.tip"} | push], **keys))
-    with ffrobot.solve(ffrobot.make_scene(**arm(line, linear, *loops))) as found:
+    with solved(arm(line, linear, *loops)) as found:
         path, moved = (found[f"{name}/points/fore.tip/position"] for name in ("follows", "pushed"))
         assert np.linalg.norm(path[-1] - path[0]) > 0.3
         assert found["follows/tip_error"].max() < 2e-4
@@ -85,4 +85,4 @@ MISTAKES = [
 @pytest.mark.parametrize(("keys", "expected"), MISTAKES)
 def test_bad_keys_are_refused(keys, expected):
     with pytest.raises(InputError, match=expected):
-        ffrobot.solve(ffrobot.make_scene(**arm(HOLD, held("loop", HOLDS) | keys)))
+        solved(arm(HOLD, held("loop", HOLDS) | keys))

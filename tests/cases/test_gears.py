@@ -6,9 +6,8 @@ import tables_3d
 from checkpoints import CASES
 from scipy.integrate import simpson
 from scipy.linalg import eigh
-from tables_3d import ORIGIN, revolute
+from tables_3d import ORIGIN, revolute, solved
 
-import ffrobot
 from ffrobot.common.errors import SolveError
 from ffrobot.mbs.joints.joint import TwistSpring
 from ffrobot.mbs.run.gears import GearSpring, gear_motion
@@ -28,10 +27,6 @@ def rigid(name, inertia, mass=1.0, center=ORIGIN):
 
 def scene(bodies, joints, *analyses, **tables):
     return tables_3d.scene(bodies, joints, *analyses, **{"gravity": ORIGIN} | tables)
-
-
-def solve(tables):
-    return ffrobot.solve(ffrobot.make_scene(**tables))
 
 
 INERTIA = np.diag([0.3, 0.2, 0.4])
@@ -54,7 +49,7 @@ def motor_and_body(turned):
 def test_two_masses_turn_and_swing(turned):
     """A moment τ behind the gear: the center of inertia turns with τ/(I_m + I), the twist goes as 1 − cos ωt."""
     tau, (*of_scene, M) = 2.0, motor_and_body(turned)
-    with solve(scene(*of_scene, RUN, load=[{"joint": "O", "moment": str(tau)}])) as found:
+    with solved(scene(*of_scene, RUN, load=[{"joint": "O", "moment": str(tau)}])) as found:
         t, gamma, motor = (found[f"run/{key}"] for key in ("time", "joints/O/coordinate", "joints/O/motor_angle"))
     values, T = eigh(K * np.array([[1, -1], [-1, 1]]), M)  # modes of (θ_m, γ)
     along, omega = T.T @ [tau, 0.0], np.sqrt(values[1])
@@ -68,7 +63,7 @@ def test_linear_model_of_a_motor_behind_its_gear(turned):
     """The frequency at which it swings against the body; θ = γ far below: both turn together."""
     *of_scene, M = motor_and_body(turned)
     expected = np.sqrt(eigh(K * np.array([[1, -1], [-1, 1]]), M, eigvals_only=True)[1])
-    with solve(scene(*of_scene, {"name": "rest", "kind": "linear"})) as results:
+    with solved(scene(*of_scene, {"name": "rest", "kind": "linear"})) as results:
         assert results["rest/linear/frequency"][0, 1] == pytest.approx(expected / (2 * np.pi), rel=1e-9)
         (model,) = results.linear("rest")
     low = model.frequency_response(np.array([1e-3]), "joint/O", ["joint/O", "motor/O"])[0, :, 0]
@@ -89,7 +84,7 @@ def free_arm():
 
 
 def test_momentum_and_energy_of_a_free_arm_are_kept():
-    with solve(free_arm()) as found:
+    with solved(free_arm()) as found:
         for key in ("linear", "angular"):
             momentum = found[f"run/momentum/{key}"]
             np.testing.assert_allclose(momentum, momentum[:1] + 0 * momentum, atol=2e-8 * np.abs(momentum).max())
@@ -113,7 +108,7 @@ def test_replays_behind_gears_are_as_good_as_outputs_are_close():
         ]
         joint = revolute("A", "ground", "arm.root", AXIS, **SOFTER)
         keys = {"gravity": [0.0, 0.0, -9.81], "trajectory": [{"name": "path", "joint": "A", "value": path}]}
-        with solve(scene([arm], [joint], *analyses, **keys)) as found:
+        with solved(scene([arm], [joint], *analyses, **keys)) as found:
             exact = found["inverse/joints/A/coordinate"][:: outputs // 20]
             apart.append(np.abs(found["run/joints/A/coordinate"] - exact).max())
     assert apart[0] > 1e-8
@@ -141,7 +136,7 @@ def test_inverse_analyses_account_for_what_gears_store_and_lose(kind, followed, 
     run = {"name": "run", "kind": kind, "end": 1.0, "output_step": 1e-3, "tolerance": 1e-10}
     run |= {"shape": "zero"} if kind == "fcid" else {"integrator": "dop853"}
     tables = scene(bodies, joints, run, trajectory=paths, initial={"state": "static", "joints": {"A": 0.5}})
-    with solve(tables | {"gravity": [1.0, -3.0, 9.0]}) as found:
+    with solved(tables | {"gravity": [1.0, -3.0, 9.0]}) as found:
         t = found["run/time"]
         twist, rate = (
             found[f"run/joints/O/motor_{key}"] - found[f"run/joints/O/{of}"]
@@ -182,7 +177,7 @@ def test_a_body_starts_twisted_or_turning_behind_a_motor_on_a_path(turned, space
         trajectory=[{"name": "t", "motor": "O", "value": "0"}],
         initial={"joints": {"O": start}, "joint_rates": {"O": rate}},
     )  # fmt: skip
-    with solve(tables) as found:
+    with solved(tables) as found:
         t, gamma, motor = (found[f"run/{key}"] for key in ("time", "joints/O/coordinate", "joints/O/motor_coordinate"))
     J = inertia + turned * gear["rotor_inertia"]
     d = c / (2 * J)
@@ -199,7 +194,7 @@ def test_motors_behind_gears_are_judged_between_outputs():
     path = {"name": "o", "joint": "O", "value": f"{A}*sin({w}*t)"}
     run = {"name": "run", "kind": "fcid", "shape": "zero", "end": 1.0, "output_step": 0.05}
     tables = scene([rigid("b", np.diag([I, I, I]).tolist())], [joint], run, trajectory=[path])
-    with solve(tables) as found:
+    with solved(tables) as found:
         judged = found.attributes("run/feasibility/joints/O")
         moment = A * w**2 * abs(I + J * N**2 - J * N**2 * I * w**2 / K)
         assert np.abs(found["run/joints/O/moment"]).max() < 0.998 * moment
@@ -221,7 +216,7 @@ def test_moments_that_set_out_from_nothing():
     load = [{"joint": "O", "moment": "4*sin(2*t)**4"}, {"joint": "A", "moment": "sin(2*t)**4"}]
     run = RUN | {"output_step": 0.05, "max_steps": 2000}
     tables = scene(bodies, joints, run, load=load, initial={"joints": {"O": 0.4, "A": 0.9}})
-    with solve(tables) as found:
+    with solved(tables) as found:
         for joint in "OA":
             motor, link = (found[f"run/joints/{joint}/{key}"] for key in ("motor_angle", "coordinate"))
             assert np.abs(motor - link).max() < 4.0 / 4e4  # the largest moment on the softest spring
@@ -250,7 +245,7 @@ def test_springs_at_rest_do_not_hold_the_steps():
     lift = {"name": "lift", "kind": "pcid", "end": 0.3, "output_step": 0.005, "tolerance": 1e-6, "max_steps": 40_000}
     bodies = [{"name": "forearm", "link": str(CASES / "arm_6r" / "forearm.toml")}, hand, tool]
     tables = scene(bodies, joints, lift, initial={"state": "static", "joints": start}, trajectory=paths)
-    with solve(tables | {"gravity": [0.0, 0.0, -9.81]}) as found:
+    with solved(tables | {"gravity": [0.0, 0.0, -9.81]}) as found:
         assert found.attributes("lift")["status"] == "completed"
 
 

@@ -9,8 +9,7 @@ import pytest
 from four_bar import out_of_plane
 from moved_scenes import MIRROR, moved, tables_of, turning
 from rotations import random_rotation, rotation
-
-import ffrobot
+from tables_3d import solved
 
 SHARE = 1e-9  # of peaks
 
@@ -34,10 +33,6 @@ def loop():
     tables["trajectory"] = [{"name": "path", "joint": "guide", "value": law}]
     tables["analysis"] = [tables["analysis"][0] | {"end": 0.04}]
     return tables
-
-
-def solved(tables):
-    return ffrobot.solve(ffrobot.make_scene(**tables))
 
 
 def close(found, expected, what, peak=None):

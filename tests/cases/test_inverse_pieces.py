@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
 from scipy.interpolate import make_interp_spline
-from tables_3d import joint, revolute, scene
+from tables_3d import joint, revolute, scene, solved
 
 import ffrobot
 from ffrobot.fe_models.link_source import LinkTable
@@ -49,10 +49,6 @@ def by_hand(analyses):
     bodies = [{"name": f"{name}{k}", "link": tables[k]} for name in NAMES for k in range(2)]
     welds = [joint(name, "weld", f"{name}0.tip", f"{name}1.root") for name in NAMES]
     return arm(bodies, welds, [(f"{name}0.root", f"{name}1.tip") for name in NAMES], analyses)
-
-
-def solved(tables):
-    return ffrobot.solve(ffrobot.make_scene(**tables))
 
 
 def agree(found, expected, share, at=slice(None)):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from four_bar import SIDES, in_3d, planar
 from scipy.interpolate import CubicSpline
+from tables_3d import solved
 
 import ffrobot
 from ffrobot.actuation.control.robot import RigidArm
@@ -28,7 +29,7 @@ def close(found, expected, share=1e-9):
 def test_friction_and_rotors_in_every_joint_of_a_loop(name):
     """The motor gives what friction takes and the rotor gains; the loop is cut elsewhere."""
     plain, built = (
-        ffrobot.solve(ffrobot.make_scene(**in_3d({key: {} for key in SIDES} | {name: keys}, [INVERSE])))
+        solved(in_3d({key: {} for key in SIDES} | {name: keys}, [INVERSE]))
         for keys in ({}, {"viscous_friction": 2.0, "rotor_inertia": 0.7})
     )
     rate, body = built[f"inverse/joints/{name}/rate"], SIDES[name][0].partition(".")[0]
@@ -76,7 +77,7 @@ BUILT = ROUGH | {"rotor_inertia": 0.05, "gear_ratio": 3.0}
 def test_limits_of_the_joint_that_is_cut(limits, is_told):
     own = of_joints("ABDC")
     own["C"] = ROUGH | {"position_limit": limits}
-    results = ffrobot.solve(ffrobot.make_scene(**in_3d(own, [INVERSE])))
+    results = solved(in_3d(own, [INVERSE]))
     peak = results["inverse/joints/C/coordinate"].max()
     assert 1.0 < peak < 1.5
     told = [text for text in results.warnings.get("inverse", ()) if 'joint "C": leaves its position_limit' in text]
@@ -96,7 +97,7 @@ HELD = {
 def test_sensors_on_any_joint_of_a_loop(built):
     """Also on the one that is listed last, at which it would be cut; with rotors in all, where it is cut."""
     own = of_joints("ABDC") | built
-    expected, found = (ffrobot.solve(ffrobot.make_scene(**tables(own, [INVERSE, HELD]))) for tables in (planar, in_3d))
+    expected, found = (solved(tables(own, [INVERSE, HELD])) for tables in (planar, in_3d))
     outputs, known = (list(results.attributes("held/control")["outputs"]) for results in (found, expected))
     assert {"joint/C", "joint/C/rate", "joint/A"} <= set(outputs)
     for number, output in enumerate(known):
@@ -110,7 +111,7 @@ def test_sensors_on_all_joints_of_a_loop_without_a_rotor_are_refused():
     own = {name: ROUGH for name in SIDES}
     sensed = HELD | {"sensor": [{"joint": name} for name in SIDES]}
     with pytest.raises(ffrobot.InputError, match=r'expected one with coordinates, found "D".* at which a loop is cut'):
-        ffrobot.solve(ffrobot.make_scene(**in_3d(own, [INVERSE, sensed])))
+        solved(in_3d(own, [INVERSE, sensed]))
 
 
 @pytest.mark.parametrize("tables", [planar, in_3d])
@@ -118,5 +119,5 @@ def test_loops_without_motors_have_no_torques_and_say_so(tables):
     analyses = [{"name": "inverse", "kind": "pcid", "end": 0.02, "output_step": 0.01}]
     for has_motor in (True, False):
         keys = tables({"A": {"motor": has_motor}} | {name: {} for name in "BCD"}, analyses)
-        found = ffrobot.solve(ffrobot.make_scene(**keys)).verdict["inverse"].notes
+        found = solved(keys).verdict["inverse"].notes
         assert any(text.startswith("no motors, so no torques") for text in found) != has_motor
