@@ -52,7 +52,7 @@ def write_page(smoothed: Smoothed, motion: Path | None, path: Path) -> None:
     }
     origins = [(str(file), sha256(file.read_bytes()).hexdigest() if file.is_file() else "") for file in used]
     content = {
-        "title": "Residual vibration", "heading": "Vibration", "solved": False, "charts": "{}", "studies": [part],
+        "title": "Residual vibration", "heading": "Vibration", "solved": False, "charts": {}, "studies": [part],
         "origins": Table(("file", "SHA-256"), origins),
         "scenes": [(used[0].name, used[0].read_text(encoding="utf-8"))],
     }  # fmt: skip

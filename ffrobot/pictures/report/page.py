@@ -1,7 +1,6 @@
 """From results files to one HTML file that needs no network."""
 
 import hashlib
-import json
 from base64 import b64encode
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
@@ -171,15 +170,18 @@ def page_of(content: Mapping[str, Any]) -> str:
         from plotly.offline import get_plotlyjs, get_plotlyjs_version
     except ModuleNotFoundError as error:
         raise SolveError(f"a report needs {error.name}, which is not installed: pip install plotly jinja2") from None
-    here = Path(__file__).parent
+    files = FileSystemLoader(Path(__file__).parent)
     environment = Environment(
-        loader=FileSystemLoader(here), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=files,
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
     )
-    files = (here / name for name in ("page.js", "modes.js", "player.js", "mechanism.js", "page.css"))
-    own = {file.name.replace(".", "_"): file.read_text(encoding="utf-8") for file in files}  # page_js, …
+    environment.policies["json.dumps_kwargs"] = {"separators": (",", ":")}
     versions = {"plotly_version": get_plotlyjs_version(), "ffrobot_version": VERSION}
-    page = environment.get_template("page.html")
-    return page.render(content, plotly_js=get_plotlyjs(), **own, **versions)
+    return environment.get_template("page.html").render(content, plotly_js=get_plotlyjs(), **versions)
 
 
 def _content(files: Sequence[Results], studies: Sequence[tuple[Path, Study]]) -> dict[str, Any]:
@@ -190,7 +192,7 @@ def _content(files: Sequence[Results], studies: Sequence[tuple[Path, Study]]) ->
         "heading": "Design",
         "solved": bool(files),
         "studies": [_study_part(study) for _, study in studies],
-        "charts": _script_data({c.name: {"data": c.traces, "layout": c.layout} for c in charts}),
+        "charts": {c.name: {"data": c.traces, "layout": c.layout} for c in charts},
         "origins": _origins_table(files, studies),
         "scenes": [(source or r.name, r.scene_text) for r, source in labelled(files)],
         **solved,
@@ -225,10 +227,10 @@ def _of_results(files: Sequence[Results]) -> tuple[dict[str, Any], list[Chart]]:
     modes, histories = link_modes(all_runs), history_charts(files)
     shapes = surface_modes(modes)
     content = {
-        "mechanism": _script_data(moving),
+        "mechanism": moving,
         "is_plane": True in planes,
         "shapes": shapes["links"],
-        "modes_3d": _script_data(shapes),
+        "modes_3d": shapes,
         "histories": folded(histories),
         "modes": modes,
         "verdicts": [_verdict(run) for run in all_runs],
@@ -237,8 +239,3 @@ def _of_results(files: Sequence[Results]) -> tuple[dict[str, Any], list[Chart]]:
         "skipped": [(source, line) for r, source in labelled(files) for line in r.skipped],
     }
     return content, [*histories, *(chart for link in modes for chart in link.charts)]
-
-
-def _script_data(value: object) -> str:
-    """JSON that may stand inside a script element: nothing in it ends the element."""
-    return json.dumps(value, ensure_ascii=True, separators=(",", ":")).replace("<", "\\u003c")
