@@ -6,7 +6,7 @@ import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,18 +30,14 @@ logger = logging.getLogger(__name__)
 AMPLITUDE = 0.1  # of the length: the largest displacement of a mode as drawn
 
 
-class DrawnMode(NamedTuple):
-    """A mode as large as pictures show it: displacement (p, 3) in m, and its size (p,) relative to the largest."""
+def drawn_mode(shape: Array, length: float) -> tuple[Array, Array]:
+    """Return a mode (p, 3) of a body of `length` (m) as large as pictures show any but one of zero.
 
-    displacement: Array
-    size: Array
-
-
-def drawn_mode(shape: Array, length: float) -> DrawnMode:
-    """Return a mode (p, 3) of a body of `length` (m) with the same largest displacement as any other, but of zero."""
+    Its displacement (p, 3) in m, and its size (p,) relative to the largest.
+    """
     size = np.linalg.norm(shape, axis=1)
     largest = float(size.max()) or 1.0
-    return DrawnMode(AMPLITUDE * length / largest * shape, size / largest)
+    return AMPLITUDE * length / largest * shape, size / largest
 
 
 def body_surface(body: ModalBody) -> PictureMesh:

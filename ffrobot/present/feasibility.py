@@ -41,7 +41,7 @@ def _tables(results: Results, name: str) -> Iterator[Table | str]:
 
     group, scene = results.group(name), results.scene
     yield f'analysis "{name}" ({group.attrs["kind"]})'
-    units = {label: one.force_unit for label, (_, one) in labelled_coordinates(scene).items()}
+    units = {label: one.force_unit for label, one in labelled_coordinates(scene).items()}
     if motors := read_motors(group["feasibility"], list(units)):
         yield _motors(motors, units)
         spikes = ((name, motor.spike_in_words(units[name])) for name, motor in motors.items())

@@ -16,7 +16,7 @@ Scene = Mapping[str, Any]
 class Coordinate(NamedTuple):
     """One coordinate of a joint."""
 
-    label: str  # what tells it from the joint's others: "" of a single one, " 1", " 2" of several
+    joint: str
     column: str  # which column of `coordinate`, `rate` and `moment` it is: "", or "[0]", "[1]"
     unit: str  # "rad" or "m"
     limits: MotorLimits  # of its motor; infinite where the scene gives none
@@ -36,23 +36,23 @@ def joint_type(keys: Mapping[str, Any]) -> type[JointRecord]:
     return JOINT_TYPES[str(keys["type"])]
 
 
-def joint_coordinates(scene: Scene, name: str) -> tuple[Coordinate, ...]:
-    """The coordinates of a joint in the order of its datasets; none of one that does not move, or is not there."""
-    keys: Scene = next((keys for keys in scene.get("joint", []) if keys["name"] == name), {})
-    units = joint_type(keys).units if keys else ()
-    limits = [np.broadcast_to(keys.get(f"{what}_limit") or np.inf, len(units)) for what in ("moment", "speed", "power")]
-    several = len(units) > 1
-    return tuple(
-        Coordinate(f" {k + 1}" if several else "", f"[{k}]" if several else "", unit, MotorLimits(*map(float, of_one)))
-        for k, (unit, *of_one) in enumerate(zip(units, *limits, strict=True))
-    )
-
-
-Coordinates = Mapping[str, tuple[str, Coordinate]]
-"""Joint and coordinate by label: the joint's name, with a number where it has several coordinates."""
+Coordinates = Mapping[str, Coordinate]
+"""By label: the joint's name, with a number where it has several coordinates."""
 
 
 def labelled_coordinates(scene: Scene) -> Coordinates:
-    """Return the coordinates of all joints by label, in the order of the scene."""
-    names = [str(joint["name"]) for joint in scene.get("joint", [])]
-    return {f"{name}{one.label}": (name, one) for name in names for one in joint_coordinates(scene, name)}
+    """Return the coordinates of all joints by label, in the order of the scene and of their datasets."""
+    coordinates = {}
+    for keys in scene.get("joint", []):
+        units = joint_type(keys).units
+        limits = [np.broadcast_to(keys.get(f"{of}_limit") or np.inf, len(units)) for of in ("moment", "speed", "power")]
+        for k, (unit, *of_one) in enumerate(zip(units, *limits, strict=True)):
+            label, column = (f" {k + 1}", f"[{k}]") if len(units) > 1 else ("", "")
+            of_motor = MotorLimits(*map(float, of_one))
+            coordinates[f"{keys['name']}{label}"] = Coordinate(keys["name"], column, unit, of_motor)
+    return coordinates
+
+
+def joint_coordinates(scene: Scene, name: str) -> tuple[Coordinate, ...]:
+    """The coordinates of a joint in the order of its datasets; none of one that does not move, or is not there."""
+    return tuple(one for one in labelled_coordinates(scene).values() if one.joint == name)

@@ -107,7 +107,7 @@ def judge(file: h5py.File, analyses: Sequence[str], scene: Scene) -> Verdict:
 def _judge(name: str, group: h5py.Group, scene: Scene) -> AnalysisVerdict:
     coordinates = labelled_coordinates(scene)
     motors = _motors(group, coordinates)
-    units = {label: coordinate.force_unit for label, (_, coordinate) in coordinates.items()}
+    units = {label: coordinate.force_unit for label, coordinate in coordinates.items()}
     patches = {body: _patches(entry) for body, entry in group.get("feasibility/pzt", {}).items()}
     answer, feasible = _answer(group, motors, patches)
     answer = answer or ", ".join(
@@ -149,8 +149,8 @@ def _motors(group: h5py.Group, coordinates: Coordinates) -> dict[str, MotorFeasi
     if "feasibility" in group:
         return read_motors(group["feasibility"], list(coordinates))
     motors, time = {}, group["time"][()]
-    for label, (joint, coordinate) in coordinates.items():
-        entry = group.get(f"joints/{joint}")
+    for label, coordinate in coordinates.items():
+        entry = group.get(f"joints/{coordinate.joint}")
         if entry is not None and "moment" in entry and "rate" in entry:
             from ..actuation.motors import judge_motion
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...results.file import Results
-from ...results.joints import Coordinate, joint_coordinates
+from ...results.joints import Coordinate, joint_coordinates, labelled_coordinates
 from .shared import Curve, FigureRecord, bending_points, both_ways, curves_of, file_name, members
 
 ROUND_OFF = 1e-9  # rad: bodies that turn no further do not turn; of the largest modal coordinates and forces
@@ -199,41 +199,34 @@ def _components(results: Results, group: str) -> list[str]:
 def _actuators(results: Results) -> Iterator[FigureRecord]:
     """What drives the robot: its motors, or without any the forces along its trajectories."""
     motors = list[FigureRecord]()
-    for joint, coordinate in _coordinates(results):
-        label = joint + coordinate.label
+    for label, coordinate in labelled_coordinates(results.scene).items():
         limit = coordinate.limits.moment
-        driven = curves_of(results, f"joints/{joint}/moment", coordinate.column)
+        driven = curves_of(results, f"joints/{coordinate.joint}/moment", coordinate.column)
         limits = both_ways(limit) if np.isfinite(limit) else ()
         motors += _histories(("moment", label), f"motor of joint {label}", driven, _force(coordinate), limits=limits)
         if np.isfinite([coordinate.limits.speed, coordinate.limits.power]).any():
-            motors += _torque_speed(results, joint, coordinate)
+            motors += _torque_speed(results, label, coordinate)
     yield from motors or _trajectory_forces(results)
 
 
 def _joints(results: Results) -> Iterator[FigureRecord]:
-    for joint, coordinate in _coordinates(results):
-        moved = curves_of(results, f"joints/{joint}/coordinate", coordinate.column)
+    for label, coordinate in labelled_coordinates(results.scene).items():
+        moved = curves_of(results, f"joints/{coordinate.joint}/coordinate", coordinate.column)
         if any(np.ptp(results.data(curve.data)) for curve in moved):
-            label, unit = joint + coordinate.label, coordinate.unit
-            y_label = f"{'angle' if unit == 'rad' else 'displacement'} ({unit})"
+            y_label = f"{'angle' if coordinate.unit == 'rad' else 'displacement'} ({coordinate.unit})"
             yield from _histories(("coordinate", label), f"joint {label}", moved, y_label)
-        yield from _torque_speed(results, joint, coordinate)
+        yield from _torque_speed(results, label, coordinate)
     for joint in members(results, "joints"):
         curves = curves_of(results, f"joints/{joint}/reaction", magnitude=True)
         yield from _histories(("reaction", joint), f"magnitude of the reaction, joint {joint}", curves, "reaction (N)")
-
-
-def _coordinates(results: Results) -> Iterator[tuple[str, Coordinate]]:
-    for joint in members(results, "joints"):
-        yield from ((joint, coordinate) for coordinate in joint_coordinates(results.scene, joint))
 
 
 def _force(coordinate: Coordinate) -> str:
     return f"{'torque' if coordinate.unit == 'rad' else 'force'} ({coordinate.force_unit})"
 
 
-def _torque_speed(results: Results, joint: str, coordinate: Coordinate) -> Iterator[FigureRecord]:
-    curves, label = [], joint + coordinate.label
+def _torque_speed(results: Results, label: str, coordinate: Coordinate) -> Iterator[FigureRecord]:
+    curves, joint = [], coordinate.joint
     for analysis in results.analyses:
         moment, rate, of_motor = (f"{analysis}/joints/{joint}/{key}" for key in ("moment", "rate", "motor_rate"))
         rate = of_motor if results.has(of_motor) else rate  # behind a compliant gear

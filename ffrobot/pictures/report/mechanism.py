@@ -186,7 +186,7 @@ def surface_modes(links: Sequence[ModesOnPage]) -> dict[str, Any]:
         kept, triangles = coarsened(mesh.points, triangles_of(mesh.cells), 8000)
         shown = min(body.mode_count, 12)  # each costs 6 bytes a point
         # Scaled on all points, so that a mode does not depend on which of them are kept.
-        modes = [drawn_mode(mesh.mode_shapes[:, :, k], 1.0).displacement[kept] / AMPLITUDE for k in range(shown)]
+        modes = [drawn_mode(mesh.mode_shapes[:, :, k], 1.0)[0][kept] / AMPLITUDE for k in range(shown)]
         entries.append(
             {
                 "label": ", ".join(link.labels),

@@ -69,8 +69,8 @@ def _peaks(results: Results, analysis: str) -> Iterator[Cells]:
         error = path_error(results, analysis, target)
         most, at = largest(results.time(analysis)[: len(error)], error)
         peaks.append((f"distance of {target.point} from its path", millimeters(most), at))
-    for label, (joint, coordinate) in labelled_coordinates(results.scene).items():
-        if results.has(moment := f"{analysis}/joints/{joint}/moment"):
+    for label, coordinate in labelled_coordinates(results.scene).items():
+        if results.has(moment := f"{analysis}/joints/{coordinate.joint}/moment"):
             peak, at = results.peak(moment + coordinate.column)
             peaks.append((f"motor of joint {label}", f"{number(peak)} {coordinate.force_unit}", at))
     for point in bending_points(results, analysis):
