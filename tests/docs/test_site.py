@@ -132,17 +132,6 @@ WORDS = [
 ]
 
 
-@pytest.mark.parametrize("page", WORDS, ids=lambda page: f"{page.parent.name}/{page.stem}")
-def test_no_link_leads_nowhere(page):
-    """As the repository shows the page: links and pictures within it, and the list of pages of the site."""
-    text, block = page.read_text(encoding="utf-8"), re.compile(r"^```(\S*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
-    places = [place for place in re.findall(r"\]\(([^)#\s]+)[^)]*\)", block.sub("", text)) if "://" not in place]
-    for language, content in block.findall(text):
-        if language == "{toctree}":
-            places += [f"{line}.md" for line in content.splitlines() if line and not line.startswith(":")]
-    assert not [place for place in places if not (page.parent / place).exists()]
-
-
 @pytest.mark.parametrize("kind", ["link", "scene", "figures"])
 def test_every_key_is_documented(kind):
     text = reference(f"{kind}_keys")
@@ -177,13 +166,22 @@ def test_every_public_member_is_documented(monkeypatch):
 
 @pytest.mark.parametrize("page", WORDS, ids=lambda page: f"{page.parent.name}/{page.stem}")
 def test_pages_are_whole(page):
-    """No path of the repository that is not there, no line that a reflow has cut out of its code block or paragraph."""
-    text, root = page.read_text(encoding="utf-8"), DOCS.parent
+    """No link to nowhere, no path of the repository that is not there, no line that a reflow has cut out of its block.
+
+    As the repository shows the page: links and pictures within it, and the list of pages of the site.
+    """
+    text, root, block = page.read_text(encoding="utf-8"), DOCS.parent, r"^```([^\n]*)\n(.*?)^```$"
+    prose = re.sub(block, "", text, flags=re.DOTALL | re.MULTILINE)
+    places = [place for place in re.findall(r"\]\(([^)#\s]+)[^)]*\)", prose) if "://" not in place]
+    for language, content in re.findall(block, text, re.DOTALL | re.MULTILINE):
+        if language == "{toctree}":
+            names = [line for line in content.splitlines() if line and not line.startswith(":")]
+            assert all(list(page.parent.glob(f"{name}.*")) for name in names)
+    assert not [place for place in places if not (page.parent / place).exists()]
     tops = {path.name for path in root.iterdir() if path.is_dir() and path.name != "build"}
     named = re.findall(r"`([\w.-]+(?:/[\w.*-]+)*/[\w*-]+\.\w+)`", text)
     of_page = (root / name for name in named if name.split("/")[0] in tops)
     assert not [path for path in of_page if not list(root.glob(str(path.relative_to(root)))) and ".h5" not in path.name]
-    prose = re.sub(r"^```.*?^```$", "", text, flags=re.DOTALL | re.MULTILINE)
     assert not re.search(r"[ \t]$|^ (?! )(?!\*)", prose, re.MULTILINE), "blanks at the beginning or the end of a line"
     for line in re.findall(r"^ {4}(\S+)", prose, re.MULTILINE):
         first = root / line

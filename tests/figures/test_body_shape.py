@@ -1,6 +1,7 @@
 """Pictures of modal bodies: of a beam from stage 1, and of surfaces made up of triangles and quadrilaterals."""
 
 from dataclasses import replace
+from itertools import count
 
 import numpy as np
 import pytest
@@ -33,24 +34,15 @@ def solid(beam, request):
     return replace(beam, kind="solid", mesh=PictureMesh(points, cells, shapes))
 
 
-def titles(figure):
-    return [axes.get_title(loc="left") for axes in figure.axes]
-
-
-def test_modes_say_frequency_and_family(beam):
-    found = titles(draw_modes(beam))
-    assert len(found) == 6
-    for k, title in enumerate(found):
-        assert title == f"{k + 1}: {beam.frequency[k]:.5g} Hz, {beam.family[k]}"
-
-
 def test_a_beam_is_drawn_at_all_its_stations(beam):
-    """Corners of its section on a ring at each, twisted ones too."""
-    figure = draw_modes(beam)
-    for axes in figure.axes:
-        _, surface = axes.collections
+    """Corners of its section on a ring at each, twisted ones too; titles say frequency and family."""
+    axes = draw_modes(beam).axes
+    titles = [f"{k}: {f:.5g} Hz, {family}" for k, f, family in zip(count(1), beam.frequency, beam.family, strict=False)]
+    assert [one.get_title(loc="left") for one in axes] == titles[:6]
+    for one in axes:
+        _, surface = one.collections
         assert len(surface.get_paths()) >= 4 * (len(beam.stations.position) - 1)
-        assert not axes.texts[0].get_text().startswith("the axis")
+        assert not one.texts[0].get_text().startswith("the axis")
 
 
 def test_modes_of_a_solid_are_drawn_over_its_outline(solid):
