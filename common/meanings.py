@@ -7,20 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
-from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     import h5py
 
-LABELS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "axis": ("x", "y", "z"),
-        "quaternion": ("w", "x", "y", "z"),
-        "stress": ("xx", "yy", "zz", "yz", "xz", "xy"),
-        "level": ("position", "velocity", "acceleration"),
-    }
-)
+LABELS: Mapping[str, tuple[str, ...]] = {
+    "axis": ("x", "y", "z"),
+    "quaternion": ("w", "x", "y", "z"),
+    "stress": ("xx", "yy", "zz", "yz", "xz", "xy"),
+    "level": ("position", "velocity", "acceleration"),
+}
 """Names of columns by what they are of; others are numbered from 1."""
 
 
@@ -48,7 +45,7 @@ def _table(text: str) -> Mapping[str, Meaning]:
             table[begin + pattern] = Meaning(*about)._replace(record=record)
         else:
             record, _, begin = pattern[1:-1].partition(" ")
-    return MappingProxyType(table)
+    return table
 
 
 RESULTS = _table("""
