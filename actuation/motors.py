@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..common.arrays import Array, Booleans, as_floats
+from ..common.arrays import Array, Booleans
 from ..common.errors import SolveError
 from ..common.peaks import largest, root_mean_square, shares
 from ..common.structs import struct
@@ -182,7 +182,7 @@ def path_jump(run: Run, at: float) -> str:
                 (t >= 0.0) & (t <= end), target.sample(np.clip(t, 0.0, end).ravel())[2].reshape(t.shape), 0.0
             )
 
-        all_over = acceleration(as_floats(np.linspace(0.0, end, 1001)))
+        all_over = acceleration(np.linspace(0.0, end, 1001))
         before, after = (acceleration(near + side * h * np.array([[1.0], [2.0]])) for side in (-1, 1))
         limits = [2 * one[0] - one[1] for one in (before, after)]
         if np.any(np.abs(limits[1] - limits[0]) > JUMP * np.abs(all_over).max()):

@@ -90,8 +90,7 @@ def joint_pid(record: JointPid, setup: Setup) -> LinearFeedback:
     """Make the PID controller of joints; its bandwidth is that at the start with rigid links and other joints free."""
     mobility = np.zeros(len(setup.robot.motors))  # 1/(kg·m²) or 1/kg, acceleration of each joint per torque
     if setup.robot.motors_fit:
-        arm = setup.robot.rigid()
-        mobility = np.diag(np.linalg.inv(arm.terms(arm.angles(), mobility)[0]))
+        mobility = setup.robot.rigid().mobility()
     shape = (len(setup.inputs), len(setup.outputs))
     P, D, integral = (np.zeros(shape) for _ in range(3))
     bandwidth = 0.0
@@ -386,15 +385,12 @@ def _estimates(record: Lqr, setup: Setup, model: LinearModel) -> tuple[Array, Ar
 
 def _out_of_reach(record: Lqr, setup: Setup, model: LinearModel, inputs: Sequence[str]) -> tuple[str, ...]:
     """Modes that no input of the design reaches, or no sensor sees."""
-    lost = controllability(model, list(inputs)).lost
-    lines = [f"LQR: uncontrollable: {', '.join(lost)}"] if lost else []
-    if setup.has_estimates:
-        return tuple(lines)
-    seen = _rigid_outputs(setup)
-    bending = setup.robot.links if record.sensor == "ideal" else setup.robot.patches
-    seen += [n for n in model.output_names if n.startswith("modal/") and n.split("/")[1] in bending]
-    hidden = observability(model, seen).lost
-    return (*lines, *([f"LQR: unobservable: {', '.join(hidden)}"] if hidden else []))
+    lost = {"uncontrollable": controllability(model, inputs).lost}
+    if not setup.has_estimates:
+        bending = setup.robot.links if record.sensor == "ideal" else setup.robot.patches
+        modes = [n for n in model.output_names if n.startswith("modal/") and n.split("/")[1] in bending]
+        lost["unobservable"] = observability(model, [*_rigid_outputs(setup), *modes]).lost
+    return tuple(f"LQR: {what}: {', '.join(names)}" for what, names in lost.items() if names)
 
 
 def _rigid_outputs(setup: Setup) -> list[str]:

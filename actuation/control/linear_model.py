@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...common.arrays import Array, ComplexArray, Indices, NDArray, as_floats
+from ...common.arrays import Array, ComplexArray, Indices, NDArray
 from ...common.errors import InputError, check_known, quoted
 from ...common.files import write_atomically
 from ...common.libraries import extras, scipy
@@ -240,7 +240,7 @@ def read_arrays(path: Path, names: Sequence[str]) -> list[Array]:
             held: Mapping[str, Any] = scipy.io.loadmat(path)
         else:
             held = np.load(path)
-        return [as_floats(np.atleast_2d(np.asarray(held[name], dtype=float))) for name in names]
+        return [np.atleast_2d(np.asarray(held[name], dtype=float)) for name in names]
     except (OSError, ValueError, KeyError, NotImplementedError) as error:
         raise InputError(f"{path}: expected a .npz or .mat file with {quoted(names)}, found: {error}") from None
 
@@ -275,7 +275,7 @@ def locked_frequencies(model: LinearModel) -> Array:
     K, _, B, _ = model.second_order
     N = free_directions(B[:, model.inputs(model.motors)].T)
     omega = np.sqrt(np.linalg.eigvalsh(N.T @ (K + K.T) @ N / 2).clip(min=0.0))
-    return as_floats(omega[omega > RIGID * omega.max(initial=0.0)] / (2 * np.pi))
+    return omega[omega > RIGID * omega.max(initial=0.0)] / (2 * np.pi)
 
 
 @struct
@@ -410,7 +410,7 @@ def zeros(model: LinearModel, inputs: Names, outputs: Names) -> Zeros:
         return Zeros(np.zeros(0, dtype=complex), np.zeros(0, dtype=complex))
     N, N_B = free_directions(c), free_directions(b.T)
     mass, damping, stiffness = N_B.T @ N, N_B.T @ D @ N / scale, N_B.T @ K @ N / scale**2
-    values, errors = _eigenvalues(mass, as_floats(damping), as_floats(stiffness))
+    values, errors = _eigenvalues(mass, damping, stiffness)
     margins = np.maximum(MARGIN * np.maximum(np.abs(values), 1.0), errors)
     side = np.where(np.abs(values.real) > margins, np.sign(values.real), 0.0)
     order = by_side(values, side)
@@ -525,7 +525,7 @@ def riccati(A: Array, B: Array, Q: Array, R: Array, within: float = 1.0) -> Arra
     K = np.linalg.solve(np.eye(len(R)) + B.T @ X @ B, B.T @ X @ A)
     if not np.abs(np.linalg.eigvals(A - B @ K)).max(initial=0.0) < within:
         raise ValueError("its solution is not stable")
-    return as_floats((X + X.T) / 2)
+    return (X + X.T) / 2
 
 
 def by_doubling(A: Array, B: Array, X: Array) -> Array | None:

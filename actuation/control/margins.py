@@ -17,7 +17,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...common.arrays import Array, ComplexArray, as_floats
+from ...common.arrays import Array, ComplexArray
 from ...common.keys import SMALLEST
 from ...common.structs import struct
 from ...common.toml_files import toml_key
@@ -205,10 +205,9 @@ def margins(loops: Loops, T: float, delay: float) -> Margins:
     if max(eigenvalue_count(loop, T, delay) for loop in loops) > FEW:
         return Margins(now, np.nan, np.nan if now <= STABLE else 0.0)
     if now > STABLE:
-        factors = as_floats(np.geomspace(1.0, 1e-2, GRID))
+        factors = np.geomspace(1.0, 1e-2, GRID)
         return Margins(now, _last_before(lambda c: radius(c, 0.0) <= STABLE, factors, missing=0.0), 0.0)
-    factors = as_floats(np.geomspace(1.0, 1e4, GRID))
-    gain = _last_before(lambda c: radius(c, 0.0) > STABLE, factors, missing=np.inf)
+    gain = _last_before(lambda c: radius(c, 0.0) > STABLE, np.geomspace(1.0, 1e4, GRID), missing=np.inf)
     waits = np.append(0.0, T * np.geomspace(0.01, 50.0, GRID))
     return Margins(now, gain, _last_before(lambda d: radius(1.0, d) > STABLE, waits, missing=np.inf))
 
@@ -263,7 +262,7 @@ def joint_inertia(model: LinearModel) -> Array | None:
         for name in (motor, motor.replace("joint/", "motor/", 1)):
             if name in names:
                 T[names.index(name), k] = 1.0
-    return as_floats(T.T @ model.mass @ T) if np.all(T.any(axis=0)) else None
+    return T.T @ model.mass @ T if np.all(T.any(axis=0)) else None
 
 
 def suggested_gains(

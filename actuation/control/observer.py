@@ -15,7 +15,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from ...common.arrays import Array, ComplexArray, as_floats
+from ...common.arrays import Array, ComplexArray
 from ...common.errors import InputError, SolveError, quoted
 from ...common.libraries import scipy
 from ...common.structs import struct
@@ -58,7 +58,7 @@ class Observer:
     @property
     def error(self) -> Array:
         """Matrix F (n, n) of the estimation error x − x̂⁻ from sample to sample."""
-        return as_floats(self.A - (self.A @ self.L + self.M) @ self.C)
+        return self.A - (self.A @ self.L + self.M) @ self.C
 
     @property
     def radius(self) -> float:
@@ -83,7 +83,7 @@ class Observer:
         u_x, u_y = inner.D @ by_x, inner.D @ by_y
         A = np.block([[self.error + self.B @ u_x, self.B @ inner.C], [inner.B @ by_x, inner.A]])
         B = np.vstack([self.A @ self.L + self.M + self.B @ u_y, inner.B @ by_y])
-        return Feedback(as_floats(A.reshape(len(A), len(self.A) + c)), B, np.hstack([u_x, inner.C]), u_y,
+        return Feedback(A.reshape(len(A), len(self.A) + c), B, np.hstack([u_x, inner.C]), u_y,
                         inner.inputs, inner.outputs[:p])  # fmt: skip
 
 

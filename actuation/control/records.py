@@ -1,7 +1,5 @@
 """Sensors, observers, controllers and closed loops of a scene file, key by key. SI units."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -80,7 +78,7 @@ class Sensor(Referring):
     )  # fmt: skip
 
     @model_validator(mode="after")
-    def _consistent(self) -> Sensor:
+    def _consistent(self) -> Self:
         subject = one_of(self, ("joint", "motor", "point", "pzt", "modal", "strain"))
         every = ("value", "rate", "acceleration", "accelerometer", "gyro")
         known = {"pzt": every[:1], "strain": every[:1], "point": every}.get(subject, every[:2])
@@ -441,18 +439,13 @@ class SampledAnalysis(ActuatedAnalysis):
 
     def replay_problems(self, source: Analysis) -> Iterator[str]:
         """Check that `source` has the inputs to feed forward, and exists before a controller is designed."""
-        for k, record in enumerate(self.controller, 1):
-            if isinstance(record, Lqr) and record.time > source.last_time * (1 + 1e-9):
+        designed = [(f"controller no. {k}", record) for k, record in enumerate(self.controller, 1)]
+        for label, record in (*designed, ("observer", self.observer)):
+            if isinstance(record, Lqr | KalmanObserver) and record.time > source.last_time * (1 + 1e-9):
                 yield (
-                    f'controller no. {k}: time: expected at most {source.last_time!r}, where "{source.name}" ends,'
-                    f" found {record.time!r}"
+                    f'{label}: time: expected at most {source.last_time!r}, where "{source.name}" ends, found'
+                    f" {record.time!r}"
                 )
-        observer = self.observer
-        if isinstance(observer, KalmanObserver) and observer.time > source.last_time * (1 + 1e-9):
-            yield (
-                f'observer: time: expected at most {source.last_time!r}, where "{source.name}" ends, found'
-                f" {observer.time!r}"
-            )
         if self.feed_forward == "joints+pzt" and source.applicable and self.feed_forward not in source.applicable:
             yield (
                 f'feed_forward: expected "joints" with an analysis of kind "{source.kind}", found "{self.feed_forward}"'

@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ...common.arrays import Array, Indices, as_floats
+from ...common.arrays import Array, Indices
 from ...common.errors import InputError, SolveError, quoted
 from ...common.structs import struct
 from ...mbs.linear.linearisation import LinearEquations, LinearMechanism, labelled
@@ -69,6 +69,11 @@ class RigidArm:
     def angles(self) -> Array:
         """Return current motor coordinates (motors,), rad or m."""
         return self._model.constraints.values(self._q[None], np.zeros(1))[0][0, self._motors]
+
+    def mobility(self) -> Array:
+        """Return accelerations (motors,) of each motor per unit torque of its own, others free, at rest; SI units."""
+        angles = self.angles()
+        return np.diag(np.linalg.inv(self.terms(angles, np.zeros_like(angles))[0]))
 
     def place(self, gamma: Array) -> tuple[Array, Array]:
         """Move to motor angles `gamma` (motors,), rad or m, from the last place; return coordinates q (n_q,) and C_v.
@@ -219,7 +224,13 @@ def estimate(volts: Array, count: int) -> Array:
 
     `volts`: readings per unit of each coordinate.
     """
-    return as_floats(np.linalg.pinv(volts[:, : min(volts.shape)])[:count])
+    return np.linalg.pinv(volts[:, : min(volts.shape)])[:count]
+
+
+def _ideal(rate: bool = True, **subject: str) -> Iterator[Sensor]:
+    yield Sensor.model_validate(subject)
+    if rate:
+        yield Sensor.model_validate(subject | {"measure": "rate"})
 
 
 def needed_sensors(robot: ControlledRobot, controllers: Sequence[Controller]) -> Iterator[Sensor]:
@@ -227,17 +238,13 @@ def needed_sensors(robot: ControlledRobot, controllers: Sequence[Controller]) ->
     for record in controllers:
         if isinstance(record, JointPid):
             for joint in record.joints:
-                yield Sensor.model_validate({record.side: joint})
-                if joint in record.derivative and record.rate == "measured":
-                    yield Sensor.model_validate({record.side: joint, "measure": "rate"})
+                yield from _ideal(joint in record.derivative and record.rate == "measured", **{record.side: joint})
         elif not isinstance(record, PythonController | ModalVelocity):
             for joint in robot.model.motors:
-                yield Sensor(joint=joint)
-                yield Sensor(joint=joint, measure="rate")
+                yield from _ideal(joint=joint)
         if isinstance(record, Lqr):
             for joint in robot.elastic_joints:
-                yield Sensor(motor=joint)
-                yield Sensor(motor=joint, measure="rate")
+                yield from _ideal(motor=joint)
         if isinstance(record, ModalVelocity | Lqr):
             bending = robot.patches if record.sensor == "pzt" else robot.links
             bodies = record.bodies if isinstance(record, ModalVelocity) else tuple(bending)
@@ -245,8 +252,7 @@ def needed_sensors(robot: ControlledRobot, controllers: Sequence[Controller]) ->
                 if record.sensor == "pzt":
                     yield from (Sensor(pzt=layout) for layout in robot.patches[body].layouts)
                 else:
-                    yield Sensor(modal=body)
-                    yield Sensor(modal=body, measure="rate")
+                    yield from _ideal(modal=body)
 
 
 def estimated_sensors(robot: ControlledRobot, controllers: Sequence[Controller], tip: str) -> Iterator[Sensor]:
@@ -256,8 +262,7 @@ def estimated_sensors(robot: ControlledRobot, controllers: Sequence[Controller],
     subjects += [{"motor": name} for name in robot.elastic_joints] + [{"modal": name} for name in robot.links]
     yield Sensor(point=tip)
     for subject in subjects:
-        yield Sensor.model_validate(subject)
-        yield Sensor.model_validate(subject | {"measure": "rate"})
+        yield from _ideal(**subject)
     yield from needed_sensors(robot, controllers)
 
 

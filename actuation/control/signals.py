@@ -5,7 +5,7 @@ from dataclasses import field
 
 import numpy as np
 
-from ...common.arrays import Array, as_floats
+from ...common.arrays import Array
 from ...common.errors import InputError, check_known, quoted
 from ...common.structs import struct
 from ...mbs.linear.linearisation import LinearMechanism, labelled
@@ -240,9 +240,9 @@ def volts_on_file(of_link: LinkPatches, layout: str, capacitance: float | None =
     pieces = [name for name in bodies if name != of_link.body]
 
     def volts(of: OnBody, parts: Iterable[str]) -> Array:
-        yielding = as_floats(np.sum([bodies[part].yielding[columns] for part in parts], axis=0))
+        yielding = np.sum([bodies[part].yielding[columns] for part in parts], axis=0)
         C = own.read_capacitance(yielding)
-        return as_floats(of.charge[:, columns] / (C if capacitance is None else capacitance)).T
+        return (of.charge[:, columns] / (C if capacitance is None else capacitance)).T
 
     return {name: volts(of, pieces if name in pieces else [name]) for name, of in bodies.items()}
 

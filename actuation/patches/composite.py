@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, Indices, as_floats
+from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...common.keys import SMALLEST
 from ...common.rotations import skew
@@ -240,8 +240,7 @@ def _strains(body: ModalBody, x: Array) -> Array:
     """B (m, 4, n): e of the modes at x (m,): differences inside an element, exact for its quadratics."""
     stations = body.stations.position[:, 0]
     h = np.minimum(1e-3 * body.length, 0.5 * np.abs(stations - x[:, None]).min(axis=1))
-    rise = potentials(body, x + h) - potentials(body, x - h)
-    return as_floats(rise / (2 * h)[:, None, None])
+    return (potentials(body, x + h) - potentials(body, x - h)) / (2 * h)[:, None, None]
 
 
 STEP = 0.1  # of the extent, from one station to the next; less is a taper
@@ -360,27 +359,24 @@ def _outlined(key: str, layout: PztLayout, body: ModalBody, edges: Array) -> Arr
             f" {_places(patches.edges)} m and {patches.width:g} m wide",
             f"{len(edges)}, from {_places(edges)} m and {layout.width:g} m wide",
         )
-    outlined_on = {"+y": patches.top, "-y": patches.bottom}
-    if layout.strain == "biaxial":
-        across = {"+y": patches.top_across, "-y": patches.bottom_across}
-        if any((of is None) != (across[face] is None) for face, of in outlined_on.items()):
+    outlined_on: dict[str, Array] = {}
+    sides = ("+y", -1.0, patches.top, patches.top_across), ("-y", 1.0, patches.bottom, patches.bottom_across)
+    for face, sign, along, across in sides:
+        if along is None:
+            continue
+        if layout.strain == "biaxial" and across is None:
             raise InputError(
                 f'{key}: strain: expected "uniaxial", or a modal body file with strains across outlined patches',
                 "one of an earlier version: recompute it from its link file with `ffrobot link`",
             )
-        outlined_on = {
-            face: None if of is None or (more := across[face]) is None else of + more
-            for face, of in outlined_on.items()
-        }
-    wanted = ["+y", "-y"] if layout.face == "both" else [layout.face] if layout.face else []
-    if missing := [face for face in wanted if outlined_on[face] is None]:
+        outlined_on[face] = sign * (along if layout.strain != "biaxial" or across is None else along + across)
+    wanted = ["+y", "-y"] if layout.face == "both" else [layout.face] if layout.face else list(outlined_on)
+    if missing := [face for face in wanted if face not in outlined_on]:
         raise InputError(
             f"{key}: face: expected patches on faces that the link file outlines ([surface_patch] faces)",
             f'"{layout.face}", of which {missing[0]} has none outlined',
         )
-    signs = {"+y": -1.0, "-y": 1.0}
-    faces = [signs[name] * of for name, of in outlined_on.items() if of is not None and (not wanted or name in wanted)]
-    return np.asarray(sum(faces) / len(faces))
+    return np.asarray(np.mean([outlined_on[face] for face in wanted], axis=0))
 
 
 def _places(edges: Array) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...common.arrays import Array, Indices, as_floats
+from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
@@ -118,8 +118,8 @@ class LinkPatches:
 
     def on_link(self, modal: Mapping[str, Array]) -> Array:
         """Modal forces (T, n), N/√kg, on the modes of the link's file, by those of bodies that carry it on theirs."""
-        found = [modal[name] @ of.to_link.T for name, of in self.bodies.items() if name in modal]
-        return as_floats(np.sum(found, axis=0))
+        found: Array = np.sum([modal[name] @ of.to_link.T for name, of in self.bodies.items() if name in modal], axis=0)
+        return found
 
     def allocation(self, *, limited: bool) -> _core.Allocation:
         """Return the map from modal forces on the modes of `reach`, N/√kg, to voltages (k,), V, limited or not."""

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...common.arrays import Array, Indices, as_floats
+from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...common.structs import struct
 from ...fe_models.link_records.families import Family
@@ -49,7 +49,7 @@ class ReachedModes:
 
     def coordinates(self, p: Array) -> Array:
         """Return p' (T, m), m·√kg, from modal coordinates of the modal body (T, n)."""
-        return as_floats(np.linalg.lstsq(self.T, p[:, self.rows].T, rcond=None)[0].T)
+        return np.linalg.lstsq(self.T, p[:, self.rows].T, rcond=None)[0].T
 
 
 @struct
@@ -197,7 +197,7 @@ def voltage_gain(patches: Reach) -> Array:
     """
     (n, k), served = patches.Phi_V.shape, patches.served
     if k == served and patches.serves_all:
-        return as_floats(np.linalg.inv(patches.Phi_V[:served]) @ np.eye(served, n))
+        return np.linalg.inv(patches.Phi_V[:served]) @ np.eye(served, n)
     W_sqrt = served_first(served, n, k) if patches.serves_all else patches.W_sqrt
     scale = voltage_scale(patches)
     return scale[:, None] * np.linalg.pinv(W_sqrt @ patches.Phi_V * scale) @ W_sqrt

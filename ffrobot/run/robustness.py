@@ -132,9 +132,7 @@ class _Runs:
     def _controller(self) -> dict[str, Any]:
         """Critically damped with rigid links and gears; slow enough for its samples where they give way to motors."""
         model, T = self.context.model, self.asked.sample_time
-        arm = ControlledRobot(model.without_paths(), self.context.patches, self.source).rigid()
-        angles = arm.angles()
-        rigid = np.diag(np.linalg.inv(arm.terms(angles, np.zeros_like(angles))[0]))
+        rigid = ControlledRobot(model.without_paths(), self.context.patches, self.source).rigid().mobility()
         mobility = model.by_motor(rigid)
         geared, start = self._geared(model)
         giving = np.diag(np.linalg.inv(mass_matrices(geared, start.q[None])[0]))[geared.motor_columns]
