@@ -30,7 +30,7 @@ from ...mbs.run.gears import supplied_in
 from ...mbs.run.record import Details, Run
 from ...mbs.scene.analysis import Surroundings
 from ..context import ActuatedContext
-from ..patches.link_patches import LinkPatches, link_patches
+from ..patches.link_patches import link_patches
 from ..patches.patches import PatchArray
 from ..patches.records import PztLayout
 from .linear_model import LinearModel, state_space
@@ -46,14 +46,10 @@ SEED = 0  # of the evolution: the same scene gives the same patches
 
 @struct
 class PatchableLink:
-    """A link to place patches on, by the m coordinates p that these reach."""
+    """A link to place the patches of a layout on, by the m coordinates p that these reach."""
 
-    name: str
-    length: float  # m
+    array: PatchArray  # of the layout, where the scene has its patches, on p
     bodies: tuple[str, ...]  # whose modal coordinates are those of the link in linear models: itself, or its pieces
-    layout: PztLayout  # of the patches
-    stiffness: Array  # (m,) of p, rad²/s²
-    served: int  # number of p, the first ones, that patches are to serve
     own: Array  # (m, n) p from the modal coordinates of the `bodies`, side by side, as linear models have them
     # patches by the keys "count" or "centers"; `InputError` where they do not fit the link
     patches: Callable[..., PatchArray]
@@ -97,7 +93,7 @@ def locked_modes(model: LinearModel, link: PatchableLink, count: int) -> tuple[A
     K = -(model.mass @ model.A[f:, :f])[block]
     squares, shape = scipy.linalg.eigh((K + K.T) / 2, model.mass[block])
     of_link = link.own @ shape[own]
-    energy = np.einsum("im,i,im->m", of_link, link.stiffness, of_link)
+    energy = np.einsum("im,i,im->m", of_link, link.array.modes.stiffness, of_link)
     share = energy / np.einsum("im,ij,jm->m", shape, (K + K.T) / 2, shape)
     chosen = np.flatnonzero((share > SHARE) & (squares > 0.0))[:count]
     return np.sqrt(squares[chosen]) / (2 * np.pi), of_link[:, chosen].T, share[chosen]
@@ -119,27 +115,28 @@ def place(
     (Gawronski, Advanced Structural Dynamics, 2004, ch. 4), relative to that of the best single patch: frequencies and
     damping drop out. Raises `InputError` where there is no room.
     """
-    key = f"{scene_path}: placement"
-    count = wanted.count or link.layout.patch_count
-    modes = wanted.modes or min(count, link.served)
-    if link.layout.coupling == "surface":
+    key, layout = f"{scene_path}: placement", link.array.layout
+    stiffness, served = link.array.modes.stiffness, link.array.served
+    count = wanted.count or layout.patch_count
+    modes = wanted.modes or min(count, served)
+    if layout.coupling == "surface":
         raise InputError(f'{key}: expected patches with coupling = "rotation"', '"surface", outlined in the mesh')
-    if wanted.pzt not in (None, link.layout.label):
-        raise InputError(f'{key}.pzt: expected "{link.layout.label}"', f'"{wanted.pzt}"')
-    if modes > link.served or (F_p is not None and modes > count):
-        most = link.served if F_p is None else min(count, link.served)
+    if wanted.pzt not in (None, layout.label):
+        raise InputError(f'{key}.pzt: expected "{layout.label}"', f'"{wanted.pzt}"')
+    if modes > served or (F_p is not None and modes > count):
+        most = served if F_p is None else min(count, served)
         raise InputError(f"{key}.modes: expected at most {most}", modes)
     centers, gap, Phi_V, C = _candidates(scene_path, wanted, link, count)
     if model is not None:
         frequency, shape, share = locked_modes(model, link, modes)
     else:  # the voltages of a path must reach those of the link itself
-        lowest = np.argsort(link.stiffness)[:modes]
-        frequency, shape = np.sqrt(link.stiffness[lowest]) / (2 * np.pi), np.eye(len(link.stiffness))[lowest]
+        lowest = np.argsort(stiffness)[:modes]
+        frequency, shape = np.sqrt(stiffness[lowest]) / (2 * np.pi), np.eye(len(stiffness))[lowest]
         share = np.ones(len(lowest))
     even = link.patches(count=count, centers=None)
     largest = np.square(shape @ Phi_V).max(axis=1)
     if not np.all(largest > 0.0):
-        raise InputError(f'{key}: expected modes that patches on "{link.name}" can reach', "some they cannot")
+        raise InputError(f'{key}: expected modes that patches on "{layout.body}" can reach', "some they cannot")
 
     def gain(Phi_V: Array) -> Array:
         return np.asarray(np.square(shape @ Phi_V) / largest[:, None])
@@ -231,18 +228,19 @@ def _candidates(
     scene_path: Path, wanted: Placement, link: PatchableLink, count: int
 ) -> tuple[Array, int, Array, Array]:
     """Places (k,), m, for the center of a patch, how many two patches lie apart, Φ_V (m, k), capacitances (k,), F."""
-    length = link.layout.length
+    layout, whole = link.array.layout, link.array.link.length
+    length = layout.length
     spacing = wanted.spacing or length / 2
-    steps = int((link.length - length) / spacing * (1 + 1e-9))
+    steps = int((whole - length) / spacing * (1 + 1e-9))
     gap = ceil(length / spacing * (1 - 1e-9))
     if steps < 0 or steps + 1 <= (count - 1) * gap:
         raise InputError(
-            f'{scene_path}: placement.count: expected patches that fit side by side on "{link.name}" ({link.length:g}'
+            f'{scene_path}: placement.count: expected patches that fit side by side on "{layout.body}" ({whole:g}'
             f" m, centers every {spacing:g} m)",
             f"{count} of {length:g} m",
         )
     centers = length / 2 + spacing * np.arange(steps + 1)
-    columns, capacitance = np.zeros((len(link.stiffness), len(centers))), np.ones(len(centers))
+    columns, capacitance = np.zeros((len(link.array.Phi_V), len(centers))), np.ones(len(centers))
     for k, center in enumerate(centers):
         try:
             patch = link.patches(count=None, centers=(float(center),))
@@ -370,9 +368,8 @@ class PatchPlacement(InstantAnalysis):
             assert self.source is not None
             source = context.outcomes[self.source]
             run = of_earlier(source, self).at([row_at(model.scene.path, self, source, t) for t in self.times])
-            of_link = _patches(context, wanted.body)
             modal = motor_forces(source.model, source.q, supplied_in(source)).modal
-            F_p = of_link.arrays[link.layout.label].modes.forces(of_link.on_link(modal))
+            F_p = link.array.modes.forces(context.patches[wanted.body].on_link(modal))
             return replace(run, details=place(model.scene.path, wanted, link, None, F_p))
         run, about = find_operating_points(context, self)
         at = LinearEquations(about.model, about.q[0]).at(float(about.time[0]), about.q[0], about.v[0], about.a[0])
@@ -392,11 +389,11 @@ def _deviation(
     plant = with_compliance(robot.model)
     read, wanted = (make_signals(plant, context, of) for of in (record.sensor, (tip,)))
     known = model_of_filter(record, robot, 0, [*read, *wanted])
-    to_file = robot.model.tree.nodes[robot.model.tree.index[link.name]].body.modal_transform
-    own = _patches(context, link.name).arrays[link.layout.label].modes.coordinates(to_file.T).T
-    columns = [k for k, name in enumerate(known.state_names) if name.startswith(f"modal/{link.name}/")]
+    layout, tree = link.array.layout, robot.model.tree
+    own = link.array.modes.coordinates(tree.nodes[tree.index[layout.body]].body.modal_transform.T).T
+    columns = [k for k, name in enumerate(known.state_names) if name.startswith(f"modal/{layout.body}/")]
     own = own[:, : len(columns)]  # the lowest modes are kept
-    as_sensor = Sensor(pzt=link.layout.label, noise=record.noise)
+    as_sensor = Sensor(pzt=layout.label, noise=record.noise)
 
     def deviation(volts: Array) -> float:
         patches = [Signal(f"patch/{k}", as_sensor) for k in range(volts.shape[1])]
@@ -419,44 +416,26 @@ def _deviation(
 def _link(context: ActuatedContext, wanted: Placement) -> PatchableLink:
     """The link by the coordinates that the layout reaches; patches elsewhere must reach the same."""
     name = wanted.body
-    path, of_link, body = context.model.scene.path, _patches(context, name), context.links[name]
-    whole = context.whole
+    path, arrays, whole = context.model.scene.path, context.patches[name].arrays, context.whole
     bodies: tuple[str, ...] = (name,)
     tree = (context.model if whole is None else whole.model).tree
     to_file = tree.nodes[tree.index[name]].body.modal_transform
     if whole is not None and name in whole.divided:
         bodies, to_file = whole.divided[name].bodies, to_file @ whole.divided[name].gathered
-    label = wanted.pzt or ("" if len(of_link.arrays) > 1 else next(iter(of_link.arrays)))
-    if label not in of_link.arrays:
+    label = wanted.pzt or ("" if len(arrays) > 1 else next(iter(arrays)))
+    if label not in arrays:
         found = f'"{label}"' if label else "none"
-        raise InputError(
-            f'{path}: placement.pzt: expected one of the layouts {quoted(of_link.arrays)} of "{name}"', found
-        )
-    reached, layout = of_link.arrays[label].modes, of_link.arrays[label].layout
+        raise InputError(f'{path}: placement.pzt: expected one of the layouts {quoted(arrays)} of "{name}"', found)
+
+    def placed(layout: PztLayout) -> PatchArray:  # also where pieces carry them, on all modes of the link's file
+        return link_patches(path, [layout], context.links[name], context.carrying[name]).arrays[label]
+
+    array = placed(arrays[label].layout)
 
     def patches(**changes: object) -> PatchArray:
-        one = layout.with_one_limit(**({"mode_weights": None, "point_weights": None} | changes))
-        found = link_patches(path, [one], body, context.carrying[name]).arrays[label]
-        if not np.array_equal(found.modes.rows, reached.rows):
+        one = array.layout.with_one_limit(**({"mode_weights": None, "point_weights": None} | changes))
+        if not np.array_equal((found := placed(one)).modes.rows, array.modes.rows):
             raise InputError(f'{path}: placement.body: expected patches that excite the modes of "{label}"')
         return found
 
-    own = reached.coordinates(to_file.T).T
-    return PatchableLink(
-        name=name,
-        length=body.length,
-        bodies=bodies,
-        layout=layout,
-        stiffness=reached.stiffness,
-        served=reached.served,
-        own=own,
-        patches=patches,
-    )
-
-
-def _patches(context: ActuatedContext, link: str) -> LinkPatches:
-    """Those of a link, also where its pieces carry them, on all modes of its file."""
-    of_link = context.patches[link]
-    layouts = [array.layout for array in of_link.arrays.values()]
-    placed = link_patches(context.model.scene.path, layouts, context.links[link], context.carrying[link])
-    return replace(placed, bodies=of_link.bodies)
+    return PatchableLink(array, bodies, array.modes.coordinates(to_file.T).T, patches)

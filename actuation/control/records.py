@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
 import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
@@ -28,6 +28,8 @@ from ...mbs.fields.field_types import (
 from ...mbs.scene.analysis import ActuatedAnalysis, Analysis, Need
 from ...mbs.scene.loads import Load
 
+Measure = Literal["value", "rate", "acceleration", "accelerometer", "gyro"]
+
 
 class Sensor(Referring):
     """A sensor of a joint coordinate, of a point, of the strain at a point, or of patch voltages.
@@ -51,7 +53,7 @@ class Sensor(Referring):
     """Body with directly read modal coordinates (m·√kg); no real sensor can."""
     strain: PointReference | None = None
     """Point "BODY.POINT" among the `stress` points of a link, with measured strain along the link."""
-    measure: Literal["value", "rate", "acceleration", "accelerometer", "gyro"] = "value"
+    measure: Measure = "value"
     """Measured quantity: value or rate; of points also acceleration, accelerometer (m/s²) or gyro (rad/s)."""
     resolution: NotNegative = 0.0
     """Resolution: readings are multiples of it, in their unit; 0: continuous."""
@@ -80,7 +82,7 @@ class Sensor(Referring):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         subject = one_of(self, ("joint", "motor", "point", "pzt", "modal", "strain"))
-        every = ("value", "rate", "acceleration", "accelerometer", "gyro")
+        every = get_args(Measure)
         known = {"pzt": every[:1], "strain": every[:1], "point": every}.get(subject, every[:2])
         if self.measure not in known:
             raise ValueError(f'expected one of {quoted(known)} as measure with "{subject}", found "{self.measure}"')

@@ -130,7 +130,6 @@ class PatchSignals:
     """The k patches of one link, and the m coordinates of it that they are to serve, the lowest first."""
 
     inputs: tuple[str, ...]  # names of their voltages and of their readings
-    layouts: tuple[str, ...]  # names in sensors
     omega: Array  # (m,) rad/s of these coordinates
     gain: Array  # (k, m) V√kg/N, voltages per force on each of these coordinates
     volts: Array  # (k, m) V/(m·√kg), readings per unit of each
@@ -180,12 +179,11 @@ class ControlledRobot:
         """Patches by link, with the modes that its layouts reach together."""
         signals = {}
         for name, of_link in self.of_links.items():
-            counts, reached = {layout: len(of.edges) for layout, of in of_link.arrays.items()}, of_link.reach.modes
-            volts = [volts_on_file(of_link, layout)[name] for layout in counts]
+            reached, arrays = of_link.reach.modes, of_link.arrays
+            volts = [volts_on_file(of_link, layout)[name] for layout in arrays]
             to_file = self.model.tree.nodes[self.model.tree.index[name]].body.modal_transform
             signals[name] = PatchSignals(
-                inputs=tuple(f"pzt/{layout}/{k}" for layout, count in counts.items() for k in range(1, count + 1)),
-                layouts=tuple(counts),
+                inputs=tuple(f"pzt/{layout}/{k}" for layout, of in arrays.items() for k in range(1, len(of.edges) + 1)),
                 omega=np.sqrt(reached.stiffness[: reached.served]),
                 gain=voltage_gain(of_link.reach),
                 volts=reached.forces(np.vstack(volts)),
@@ -227,10 +225,10 @@ def estimate(volts: Array, count: int) -> Array:
     return np.linalg.pinv(volts[:, : min(volts.shape)])[:count]
 
 
-def _ideal(rate: bool = True, **subject: str) -> Iterator[Sensor]:
+def _ideal(subject: Mapping[str, str], *, rate: bool = True) -> Iterator[Sensor]:
     yield Sensor.model_validate(subject)
     if rate:
-        yield Sensor.model_validate(subject | {"measure": "rate"})
+        yield Sensor.model_validate({**subject, "measure": "rate"})
 
 
 def needed_sensors(robot: ControlledRobot, controllers: Sequence[Controller]) -> Iterator[Sensor]:
@@ -238,21 +236,22 @@ def needed_sensors(robot: ControlledRobot, controllers: Sequence[Controller]) ->
     for record in controllers:
         if isinstance(record, JointPid):
             for joint in record.joints:
-                yield from _ideal(joint in record.derivative and record.rate == "measured", **{record.side: joint})
+                is_rated = joint in record.derivative and record.rate == "measured"
+                yield from _ideal({record.side: joint}, rate=is_rated)
         elif not isinstance(record, PythonController | ModalVelocity):
             for joint in robot.model.motors:
-                yield from _ideal(joint=joint)
+                yield from _ideal({"joint": joint})
         if isinstance(record, Lqr):
             for joint in robot.elastic_joints:
-                yield from _ideal(motor=joint)
+                yield from _ideal({"motor": joint})
         if isinstance(record, ModalVelocity | Lqr):
             bending = robot.patches if record.sensor == "pzt" else robot.links
             bodies = record.bodies if isinstance(record, ModalVelocity) else tuple(bending)
             for body in bodies:
                 if record.sensor == "pzt":
-                    yield from (Sensor(pzt=layout) for layout in robot.patches[body].layouts)
+                    yield from (Sensor(pzt=layout) for layout in robot.of_links[body].arrays)
                 else:
-                    yield from _ideal(modal=body)
+                    yield from _ideal({"modal": body})
 
 
 def estimated_sensors(robot: ControlledRobot, controllers: Sequence[Controller], tip: str) -> Iterator[Sensor]:
@@ -262,7 +261,7 @@ def estimated_sensors(robot: ControlledRobot, controllers: Sequence[Controller],
     subjects += [{"motor": name} for name in robot.elastic_joints] + [{"modal": name} for name in robot.links]
     yield Sensor(point=tip)
     for subject in subjects:
-        yield from _ideal(**subject)
+        yield from _ideal(subject)
     yield from needed_sensors(robot, controllers)
 
 

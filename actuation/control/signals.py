@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import field
+from typing import get_args
 
 import numpy as np
 
@@ -18,9 +19,9 @@ from ...mbs.run.context import WholeLinks, place_of
 from ...mbs.scene.space import SPACES
 from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches, OnBody
-from .records import Sensor
+from .records import Measure, Sensor
 
-ORDERS = {"value": 0, "rate": 1, "acceleration": 2, "accelerometer": 3, "gyro": 4}
+ORDERS = {measure: order for order, measure in enumerate(get_args(Measure))}
 STEP = 2.0**-13  # of differences of readings of points, in rad, m, √kg·m and these per s
 
 

@@ -21,6 +21,7 @@ face stretch the link, too, and those off the middle of the width bend it about 
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -153,23 +154,20 @@ def stiffness_ratios(placed: PlacedLayout, body: ModalBody) -> tuple[Array, Arra
     sections = link_sections(body)
     own, felt = own_row(layout), felt_rows(layout)
 
-    def ratios(station: int) -> tuple[float, float]:
+    @cache
+    def ratios(station: int) -> Array:
         rigidity = sections.rigidity[station]
         C, f = felt_loads(layout, sections, station)
         strain = np.linalg.solve(np.diag(rigidity[felt]) + C[np.ix_(felt, felt)], f[felt])[np.searchsorted(felt, own)]
         psi = rigidity[STRETCH] / (layout.modulus * layout.width * layout.layers * layout.thickness)
         straight = straight_loads(layout, *place_of(layout, sections, station))[own]
-        return psi, strain * rigidity[own] / straight
+        return np.array([psi, strain * rigidity[own] / straight])
 
-    # (k, stations − 1) m of each patch between one station and the next, without slivers
-    x, alike = sections.x, sections.alike[:-1]
-    starts, ends = (edge[:, None] for edge in edges.clip(0.0, body.length).T)
-    lengths = (np.minimum(ends, x[1:]) - np.maximum(starts, x[:-1])).clip(min=0.0)
-    lengths = np.where(lengths > SLIVER * (ends - starts), lengths, 0.0)
-    covered = np.unique(alike[lengths.any(axis=0)])
-    shares = np.stack([lengths[:, alike == station].sum(axis=1) for station in covered], axis=1)
-    found = shares @ np.array([ratios(int(station)) for station in covered]) / shares.sum(axis=1, keepdims=True)
-    return found[:, 0], found[:, 1]
+    found = np.zeros((2, len(edges)))
+    for at in gauss_points(body, edges):
+        found[:, at.interval] += at.weight * ratios(int(sections.alike[at.station]))
+    psi, authority = found / np.diff(edges.clip(0.0, body.length))[:, 0]
+    return psi, authority
 
 
 def gauss_points(body: ModalBody, intervals: Array) -> Iterator[GaussPoint]:

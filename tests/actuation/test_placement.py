@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
-from patches_on_links import SCENE, layout, patches, planar_body
+from patches_on_links import SCENE, patches, planar_body
 from scipy.linalg import solve_continuous_lyapunov
 
 import ffrobot
@@ -35,8 +35,7 @@ def link_of(modal, planar, count):
     def elsewhere(**changes):
         return patches(modal, planar, allocation="least-squares", **({"count": count} | changes))
 
-    own, wanted = np.eye(planar.n_modes), layout("arm", count=count)
-    return PatchableLink("arm", modal.length, ("arm",), wanted, planar.stiffness, planar.n_modes, own, elsewhere)
+    return PatchableLink(elsewhere(), ("arm",), np.eye(planar.n_modes), elsewhere)
 
 
 def placed(arm, count, F_p=None, **keys):
