@@ -2,6 +2,7 @@
 
 import numpy as np
 from beam_links import beam_link, rectangle
+from one_link import one_link
 
 import ffrobot
 
@@ -17,28 +18,14 @@ def tip(height, face, modes, pieces=1, **keys):
 
 def solved(height, face, modes, pieces=1, places=(), **keys):
     """Results; stress points p0 … on the upper side at `places`."""
-    link = beam_link(
-        L,
-        rectangle(height, B),
-        40,
-        E=E,
-        nu=0.3,
-        name="strip",
-        modes={"family": "in-plane-bending"} | modes,
-        stress={"points": {f"p{k}": [x, height / 2, 0.0] for k, x in enumerate(places)}},
-    )
+    stress = {"points": {f"p{k}": [x, height / 2, 0.0] for k, x in enumerate(places)}}
+    modes = {"family": "in-plane-bending"} | modes
+    link = beam_link(L, rectangle(height, B), 40, E=E, nu=0.3, name="strip", modes=modes, stress=stress)
     centers, on = [(START + END) / 2], {"face": face} if face else {}
     pzt = {"body": "strip", "centers": centers, "length": END - START, "width": B, "thickness": T_P, **on, **keys}
-    scene = ffrobot.make_scene(
-        name="strip",
-        gravity=[0.0, 0.0],
-        body=[{"name": "strip", "link": link, "pieces": pieces}],
-        joint=[{"name": "wall", "type": "weld", "between": ["ground", "strip.root"]}],
-        pzt=[pzt | {"modulus": E_P, "d31": D31}],
-        load=[{"pzt": "strip", "voltage": [f"{VOLT}"]}],
-        analysis=[{"name": "bent", "kind": "static"}],
-    )
-    return ffrobot.solve(scene)
+    keys = {"body": [{"name": "strip", "link": link, "pieces": pieces}], "pzt": [pzt | {"modulus": E_P, "d31": D31}]}
+    load = [{"pzt": "strip", "voltage": [f"{VOLT}"]}]
+    return ffrobot.solve(one_link("strip", link, {"name": "bent", "kind": "static"}, load=load, **keys))
 
 
 def exact(height, faces):

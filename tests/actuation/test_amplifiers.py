@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from beam_links import paper_link
+from one_link import one_link
 from patches_on_links import layout
 
 import ffrobot
@@ -179,16 +180,10 @@ def test_inverse_of_hysteresis_and_loop_area():
 
 def test_fast_voltages_of_a_long_run():
     """Of 400 Hz over 20 s, and 100 V at a time, a play operator of 40 V is 40 V behind from the first peak on."""
-    patch = layout(count=1, hysteresis={"weights": (0.5, 0.5), "thresholds": (0.0, 40.0)}).model_dump(
-        exclude_unset=True
-    )
-    scene = {
-        "name": "strip", "gravity": [0.0, 0.0], "body": [{"name": "link", "link": paper_link()}],
-        "joint": [{"name": "wall", "type": "weld", "between": ["ground", "link.root"]}],
-        "pzt": [patch], "load": [{"pzt": "link", "voltage": ["100*sin(800*pi*t)"]}],
-        "analysis": [{"name": "long", "kind": "forward", "end": 20.0, "output_step": 1.0}],
-    }  # fmt: skip
-    (drive,) = prepare_scene(ffrobot.make_scene(**scene)).model.modal_loads
+    patch = layout(count=1, hysteresis={"weights": (0.5, 0.5), "thresholds": (0.0, 40.0)})
+    keys = {"pzt": [patch.model_dump(exclude_unset=True)], "load": [{"pzt": "link", "voltage": ["100*sin(800*pi*t)"]}]}
+    scene = one_link("link", paper_link(), {"name": "long", "kind": "forward", "end": 20.0, "output_step": 1.0}, **keys)
+    (drive,) = prepare_scene(scene).model.modal_loads
     t = 19.5 + np.linspace(0.0, 0.01, 1001)
     V, is_rising = 100.0 * np.sin(800 * np.pi * t), np.cos(800 * np.pi * t) > 0.0
     last = np.where(is_rising, np.maximum(-60.0, V - 40.0), np.minimum(60.0, V + 40.0))

@@ -1,8 +1,11 @@
 """Patches without a voltage of an amplifier: open electrodes in closed form, resistors by their charge as a state."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from beam_links import beam_link, modal_body, rectangle
+from one_link import one_link
 from patches_on_links import SCENE
 
 import ffrobot
@@ -141,34 +144,25 @@ def test_contradictions(keys, message):
 
 
 def test_voltages_for_passive_patches_are_refused():
-    scene = {
-        "name": "strip", "gravity": [0.0, 0.0], "body": [{"name": "strip", "link": LINK}],
-        "joint": [{"name": "wall", "type": "weld", "between": ["ground", "strip.root"]}],
-        "pzt": [PATCH | {"shunt": 1e4}], "load": [{"pzt": "strip", "voltage": ["1.0"]}],
-        "analysis": [{"name": "bent", "kind": "static"}],
-    }  # fmt: skip
+    bent, shunted = {"name": "bent", "kind": "static"}, [PATCH | {"shunt": 1e4}]
     with pytest.raises(InputError, match=r'load no. 1: pzt: expected patches that voltages drive .*, found "strip"'):
-        ffrobot.make_scene(**scene)
+        one_link("strip", LINK, bent, pzt=shunted, load=[{"pzt": "strip", "voltage": ["1.0"]}])
     seen = {"name": "seen", "kind": "linear", "sensor": [{"pzt": "strip"}]}
     with pytest.raises(InputError, match=r'"seen": sensor: pzt: expected patches without a shunt.*, found "strip"'):
-        ffrobot.make_scene(**(scene | {"load": [], "analysis": [seen]}))
+        one_link("strip", LINK, seen, pzt=shunted)
 
 
 def test_passive_patches_need_nothing_and_pieces_leave_their_charge_whole():
     """A shunt acts at frequencies of the whole link; a cut would make two charges of one."""
     damped = LINK | {"damping": {"rayleigh": [0.0, 1e-7]}}
-    scene = {
-        "name": "strip", "gravity": [0.0, 0.0],
-        "joint": [{"name": "hub", "type": "revolute", "between": ["ground", "strip.root"]}],
-        "trajectory": [{"name": "turn", "joint": "hub", "value": "0.1*t**3"}],
-        "analysis": [{"name": "turned", "kind": "pcid", "end": 0.1, "output_step": 0.01}],
-    }  # fmt: skip
-    whole, halves = ([{"name": "strip", "link": damped, "pieces": pieces}] for pieces in (1, 2))
-    with ffrobot.solve(ffrobot.make_scene(**scene, body=whole, pzt=[PATCH | PLACE | {"shunt": 1e4}])) as results:
+    turned = {"name": "turned", "kind": "pcid", "end": 0.1, "output_step": 0.01}
+    halves = [{"name": "strip", "link": damped, "pieces": 2}]
+    turning = partial(one_link, "strip", damped, turned, joint={}, target="0.1*t**3")
+    with ffrobot.solve(turning(pzt=[PATCH | PLACE | {"shunt": 1e4}])) as results:
         assert not results.verdict["turned"].patches
     for keys, message in (
         ({"shunt": 1e4, **PLACE}, "shunt: expected a link in one piece with a shunt, found 2 pieces"),
         ({"electrodes": "open"}, 'through a patch with electrodes = "open", found one at 0.15 m'),
     ):
         with pytest.raises(InputError, match=message):
-            ffrobot.solve(ffrobot.make_scene(**scene, body=halves, pzt=[PATCH | keys]))
+            ffrobot.solve(turning(body=halves, pzt=[PATCH | keys]))

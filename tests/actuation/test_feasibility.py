@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from beam_links import beam_link, paper_link, tube
+from one_link import one_link
 from patches_on_links import CERAMIC
 
 import ffrobot
@@ -16,19 +17,13 @@ LIMIT = 200.0
 RUN = {"end": 0.5, "output_step": 0.01}
 STRAIGHT = {"kind": "fcid", "shape": "zero"} | RUN
 MOTOR = {"moment_limit": 10.0, "speed_limit": 0.2, "power_limit": 1e3}
-TURN = {"joint": "O", "value": "0.1*sin(2*t)"}
-STILL = {"joint": "O", "value": "0"}
 
 
-def arm(analysis=STRAIGHT, trajectory=TURN, limit=LIMIT, load=(), motor=MOTOR):
-    """One horizontal link of the paper, its motor moved as `trajectory` says."""
+def arm(analysis=STRAIGHT, target="0.1*sin(2*t)", limit=LIMIT, load=(), motor=MOTOR):
+    """One horizontal link of the paper, its motor moved as `target` says."""
     patches = CERAMIC | {"count": 10, "structural": False, "limit": limit, "depoling_field": 5e5}
-    return solve_scene(ffrobot.make_scene(
-        name="arm", gravity=[0.0, -9.81], body=[{"name": "link", "link": paper_link()}],
-        joint=[{"name": "O", "type": "revolute", "between": ["ground", "link.root"]} | motor],
-        trajectory=[{"name": "turn"} | trajectory], pzt=[{"body": "link"} | patches], load=list(load),
-        analysis=[{"name": "motion"} | analysis],
-    ))  # fmt: skip
+    keys = {"gravity": [0.0, -9.81], "target": target, "pzt": [{"body": "link"} | patches], "load": list(load)}
+    return solve_scene(one_link("link", paper_link(), {"name": "motion"} | analysis, joint=motor, **keys))
 
 
 def judged_of(solution):
@@ -69,7 +64,7 @@ def test_patches_peak_by_peak():
 
 def test_strain_under_a_static_load_is_that_of_the_beam():
     """ε = (t_b/2 + t_p) M(x)/EI with M of the weight, averaged along the patch (Euler–Bernoulli)."""
-    solution = arm(STRAIGHT | {"shape": "static"}, STILL)
+    solution = arm(STRAIGHT | {"shape": "static"}, "0")
     x = np.linspace(0.025, 0.075, 201)  # the first patch
     M = 7850.0 * 0.025 * 0.015 * 9.81 * (1 - x) ** 2 / 2
     expected = (0.0075 + 0.75e-3) * M.mean() / (2.068427e11 * 0.025 * 0.015**3 / 12)
@@ -141,12 +136,12 @@ def test_motors_peak_by_peak():
 
 def test_predicted_shift_of_the_tip_is_what_happens():
     """Held by its motor under its weight: patches at their limits against patches without, each solved statically."""
-    straight = arm(trajectory=STILL)
+    straight = arm(target="0")
     voltages = straight.analyses["motion"].actuation.voltages["link"]
     tips = []
     for volts in (voltages.required[0], voltages.within_limit[0]):
         load = {"pzt": "link", "voltage": [f"{v!r}" for v in volts.tolist()]}
-        held = arm({"kind": "static"}, STILL, load=[load])
+        held = arm({"kind": "static"}, "0", load=[load])
         tips.append(deflection(held.analyses["motion"].run, "link.tip")[0, 1])
     assert abs(tips[0]) < 1e-12  # straight
     np.testing.assert_allclose(
@@ -158,7 +153,7 @@ def test_rms_and_shares_of_time_by_hand():
     """τ = m g L/2 + J θ̈ at θ ≈ 0 over whole periods; speed 0.2 |cos 2t| against a limit of 0.1: beyond for 2/3."""
     solution = arm(
         STRAIGHT | {"end": np.pi, "output_step": np.pi / 2000},
-        trajectory={"joint": "O", "value": "1e-3*sin(2*t)"},
+        target="1e-3*sin(2*t)",
         motor={"speed_limit": 1e-3},
     )
     motor = judged_of(solution).motors["O"]
@@ -177,7 +172,7 @@ def test_rms_and_shares_of_time_by_hand():
     ],
 )
 def test_jump_of_a_path_is_seen(value, jump):
-    result = arm(trajectory={"joint": "O", "value": value}).analyses["motion"]
+    result = arm(target=value).analyses["motion"]
     assert path_jump(result.run, 0) == jump
 
 
@@ -198,30 +193,23 @@ def test_short_peaks_of_motors_only_are_laid_to_the_jerk():
 
 def three_links(law):
     """Upper arm, forearm and hand, their tip and their hand's angle led along a law of motion from 0 to 1."""
-    link = beam_link(
-        0.5,
-        tube(0.04, 0.034),
-        10,
-        modes={"count": 4, "attachment_modes": False, "family": "in-plane-bending"},
-        damping={"ratio": 0.01},
-    )
-    hand = link | {"geometry": link["geometry"] | {"length": 0.15}}
-    rotor = {"type": "revolute", "gear_ratio": 100.0}
-    small = rotor | {"gear_ratio": 50.0, "rotor_inertia": 1e-5}
+    modes = {"count": 4, "attachment_modes": False, "family": "in-plane-bending"}
+    links = {"upper": 0.5, "fore": 0.5, "hand": 0.15}
+    bodies = [
+        {"name": name, "link": beam_link(length, tube(0.04, 0.034), 10, modes=modes, damping={"ratio": 0.01})}
+        for name, length in links.items()
+    ]
+    motors = ("shoulder", 100.0, 6e-5), ("elbow", 100.0, 2e-5), ("wrist", 50.0, 1e-5)
+    before = ("ground", *(f"{name}.tip" for name in links))
+    joints = [
+        {"name": name, "type": "revolute", "between": [a, f"{b}.root"], "gear_ratio": N, "rotor_inertia": J}
+        for (name, N, J), a, b in zip(motors, before, links, strict=False)
+    ]
+    tip = {"name": "tip", "point": "hand.tip", "x": f"0.85 - 0.2*{law}", "y": f"0.2 + 0.2*{law}"}
     return ffrobot.make_scene(
-        name="three links",
-        gravity=[0.0, -9.81],
-        body=[{"name": "upper", "link": link}, {"name": "fore", "link": link}, {"name": "hand", "link": hand}],
+        name="three links", gravity=[0.0, -9.81], body=bodies, joint=joints,
         payload=[{"point": "hand.tip", "mass": 1.0}],
         initial={"state": "static", "angles": {"upper": "60*deg", "fore": "-20*deg", "hand": "-30*deg"}},
-        joint=[
-            rotor | {"name": "shoulder", "between": ["ground", "upper.root"], "rotor_inertia": 6e-5},
-            rotor | {"name": "elbow", "between": ["upper.tip", "fore.root"], "rotor_inertia": 2e-5},
-            small | {"name": "wrist", "between": ["fore.tip", "hand.root"]},
-        ],
-        trajectory=[
-            {"name": "tip", "point": "hand.tip", "x": f"0.85 - 0.2*{law}", "y": f"0.2 + 0.2*{law}"},
-            {"name": "grip", "angle": "hand", "value": f"-0.5 + 0.3*{law}"},
-        ],
+        trajectory=[tip, {"name": "grip", "angle": "hand", "value": f"-0.5 + 0.3*{law}"}],
         analysis=[{"name": "motors", "kind": "motors-only", "end": 0.5, "output_step": 0.0005}],
-    )
+    )  # fmt: skip

@@ -32,11 +32,8 @@ class Case:
     def plant(self):
         """x = (angles, rates): of the wheel alone, or of motor and wheel; what the torque and the blow do."""
         if self.spring is None:
-            return (
-                np.array([[0, 1], [0, 0.0]]),
-                np.array([[0], [1 / self.inertia]]),
-                np.array([[0], [ARM / self.inertia]]),
-            )
+            of_torque = np.array([[0], [1 / self.inertia]])
+            return np.array([[0, 1], [0, 0.0]]), of_torque, ARM * of_torque
         rotor, k, c = self.spring
         M, one = np.diag([rotor, self.inertia]), np.array([[1.0, -1.0], [-1.0, 1.0]])
         A = np.block([[np.zeros((2, 2)), np.eye(2)], [-np.linalg.solve(M, k * one), -np.linalg.solve(M, c * one)]])
@@ -155,10 +152,7 @@ class Case:
             commands.append(u)
             angles.append(x[len(x) // 2 - 1])
             force = self.blow if k * self.T < 0.1 - 1e-9 else 0.0
-            for (phi, of_u, of_force), acting in (
-                (before, commands[-int(late) - 2]),
-                (after, commands[-int(late) - 1]),
-            ):
+            for (phi, of_u, of_force), acting in zip((before, after), commands[-int(late) - 2 :], strict=False):
                 x = phi @ x + of_u[:, 0] * acting + of_force[:, 0] * force
         return np.array(angles), np.array(commands[int(late) + 1 :])
 
@@ -177,20 +171,12 @@ class Case:
 
     def tables(self):
         """Of its scene."""
-        body = {
-            "mass": 1.0,
-            "inertia": self.inertia,
-            "center": [0.0, 0.0],
-            "points": {"root": [0.0, 0.0], "rim": [ARM, 0.0]},
-        }
+        points = {"root": [0.0, 0.0], "rim": [ARM, 0.0]}
+        body = {"mass": 1.0, "inertia": self.inertia, "center": [0.0, 0.0], "points": points}
         joint = {"name": "O", "type": "revolute", "between": ["ground", "w.root"]}
         if self.spring:
-            joint |= {
-                "gear_ratio": 10.0,
-                "rotor_inertia": self.spring[0] / 100,
-                "stiffness": self.spring[1],
-                "damping": self.spring[2],
-            }
+            rotor, k, c = self.spring
+            joint |= {"gear_ratio": 10.0, "rotor_inertia": rotor / 100, "stiffness": k, "damping": c}
         if np.isfinite(self.limit):
             joint["moment_limit"] = self.limit
         subject = "motor" if self.spring else "joint"

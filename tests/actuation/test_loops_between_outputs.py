@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from beam_links import beam_link, tube
 from loop_scenes import INERTIA, PID, T, blow, loop, wheel
+from one_link import one_link
 
 import ffrobot
 from ffrobot.run.solve import solve_scene
-from ffrobot.scene.load import make_scene
 
 
 @pytest.mark.parametrize("lasts", [1e-3, 2e-5])
@@ -57,16 +57,11 @@ def test_peaks_of_what_rings_do_not_depend_on_outputs():
     """A tube that is hit rings at 100 Hz and more between samples: outputs far apart, and closer than its periods."""
 
     def found(step):
-        joint = {"name": "O", "type": "revolute", "between": ["ground", "arm.root"], "rotor_inertia": 0.05}
         link = beam_link(0.5, tube(0.03, 0.026), 10, nu=None, modes={"count": 3, "family": "in-plane-bending"})
         inverse = {"name": "inverse", "kind": "pcid", "end": 0.2, "output_step": step}
         hit = [{"point": "arm.tip", "y": "where(t < 0.0007, 200, 0)"}]
         control = loop(sample_time=1e-3, controller=[PID], disturbance=hit)
-        scene = make_scene(
-            name="rings", gravity=[0.0, 0.0], body=[{"name": "arm", "link": link}], joint=[joint],
-            trajectory=[{"name": "stand", "joint": "O", "value": "0"}], analysis=[inverse, control],
-        )  # fmt: skip
-        results = ffrobot.solve(scene)
+        results = ffrobot.solve(one_link("arm", link, inverse, control, joint={"rotor_inertia": 0.05}, target="0"))
         seen = {of: results.attributes(f"loop/joints/O/{of}") for of in ("rate", "reaction", "moment")}
         rates = results["loop/joints/O/rate"]
         return [about[key] for about in seen.values() for key in ("peak", "rms")], np.abs(rates).max()

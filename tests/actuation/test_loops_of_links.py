@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 from beam_links import paper_link
 from loop_scenes import loop
+from one_link import one_link
 
 from ffrobot.mbs.quantities.motion import node_of
 from ffrobot.run.solve import solve_scene
-from ffrobot.scene.load import make_scene
 
+HIT = [{"point": "link.tip", "y": "where(t < 0.002, 20*sin(pi*t/0.002), 0)"}]
+DAMPER = {"kind": "modal-velocity", "bodies": ["link"], "damping_ratio": 0.05}
 PATCHES = {
     "body": "link", "count": 10, "length": 0.05, "width": 0.025, "thickness": 0.75e-3, "modulus": 63e9,
     "d31": 110e-12, "structural": False,
@@ -18,13 +20,9 @@ PATCHES = {
 def held_link(link, *analyses, **keys):
     """A cantilever whose root a rotor holds like a wall, sagging; its tip is hit for 2 ms."""
     inverse = {"name": "inverse", "kind": "fcid", "shape": "static", "end": keys.pop("end", 0.4), "output_step": 5e-4}
-    hit = [{"point": "link.tip", "y": "where(t < 0.002, 20*sin(pi*t/0.002), 0)"}]
-    joint = {"name": "O", "type": "revolute", "between": ["ground", "link.root"], "rotor_inertia": 1e4}
-    return make_scene(
-        name="held", gravity=[0.0, -9.81], body=[{"name": "link", "link": link}], joint=[joint],
-        trajectory=[{"name": "stand", "joint": "O", "value": "0"}], pzt=[PATCHES | keys.pop("pzt", {})],
-        analysis=[inverse, *(analysis | {"disturbance": hit, "tolerance": 1e-6} for analysis in analyses)], **keys,
-    )  # fmt: skip
+    loops = [analysis | {"disturbance": HIT, "tolerance": 1e-6} for analysis in analyses]
+    keys = {"joint": {"rotor_inertia": 1e4}, "target": "0", "pzt": [PATCHES | keys.pop("pzt", {})]} | keys
+    return one_link("link", link, inverse, *loops, gravity=[0.0, -9.81], **keys)
 
 
 def decay(solution, name):
@@ -37,19 +35,16 @@ def decay(solution, name):
     return -np.polyfit(outcome.time[ring], np.log(envelope[ring]), 1)[0] / omega
 
 
-@pytest.mark.parametrize("sensor", [pytest.param("ideal", marks=pytest.mark.nightly), "pzt"])
-def test_patches_add_the_damping_that_is_asked_for(sensor):
-    control = {"kind": "modal-velocity", "bodies": ["link"], "modes": 1, "damping_ratio": 0.05, "sensor": sensor}
-    loops = loop(sample_time=1e-4, controller=[control]), loop("free", sample_time=1e-4)
-    scene = held_link(paper_link(count=3), *loops, end=0.2)
-    solution = solve_scene(scene)
+def test_patches_add_the_damping_that_is_asked_for():
+    """By their own voltages."""
+    loops = loop(sample_time=1e-4, controller=[DAMPER]), loop("free", sample_time=1e-4)
+    solution = solve_scene(held_link(paper_link(count=3), *loops, end=0.2))
     assert abs(decay(solution, "free")) < 1e-4
     assert decay(solution, "loop") == pytest.approx(0.05, rel=0.05)
 
 
 def test_patches_damp_as_many_modes_as_they_read():
-    damper = {"kind": "modal-velocity", "bodies": ["link"], "damping_ratio": 0.05}
-    loops = [loop(f"of_{modes}", controller=[damper | {"modes": modes}]) for modes in (2, 3)]
+    loops = [loop(f"of_{modes}", controller=[DAMPER | {"modes": modes}]) for modes in (2, 3)]
     patches = {"count": 2, "allocation": "least-squares"}
     solution = solve_scene(held_link(paper_link(count=3), *loops, end=0.02, pzt=patches))
     few, more = (solution.outcomes[f"of_{modes}"].details.commands for modes in (2, 3))
@@ -64,21 +59,16 @@ def test_patches_damp_as_many_modes_as_they_read():
 )  # fmt: skip
 def test_a_beam_that_is_welded_needs_no_trajectory(space, inverse):
     """Its tip is hit, and patches damp it as is asked for: nothing moves but the link."""
-    control = {"kind": "modal-velocity", "bodies": ["link"], "modes": 1, "damping_ratio": 0.05, "sensor": "ideal"}
-    hit = [{"point": "link.tip", "y": "where(t < 0.002, 20*sin(pi*t/0.002), 0)"}]
-    solution = solve_scene(make_scene(
-        name="welded", space=space, gravity=[0.0, 0.0] if space == "planar" else [0.0, 0.0, 0.0],
-        body=[{"name": "link", "link": paper_link(count=3)}], pzt=[PATCHES],
-        joint=[{"name": "O", "type": "weld", "between": ["ground", "link.root"]}],
-        analysis=[{"name": "inverse", "end": 0.15, "output_step": 5e-4} | inverse,
-                  loop(sample_time=1e-4, controller=[control], disturbance=hit)],
-    ))  # fmt: skip
+    damped = loop(sample_time=1e-4, controller=[DAMPER | {"sensor": "ideal"}], disturbance=HIT)
+    inverse = inverse | {"name": "inverse", "end": 0.15, "output_step": 5e-4}
+    keys = {"space": space, "gravity": [0.0] * (2 if space == "planar" else 3), "pzt": [PATCHES]}
+    solution = solve_scene(one_link("link", paper_link(count=3), inverse, damped, **keys))
     assert decay(solution, "loop") == pytest.approx(0.05, rel=0.05)
 
 
 def test_all_integrators_go_from_sample_to_sample_alike():
     """Loads jump at every sample: methods that look back must not look across."""
-    control = {"kind": "modal-velocity", "bodies": ["link"], "damping_ratio": 0.05, "sensor": "ideal"}
+    control = DAMPER | {"sensor": "ideal"}
     names = ["dop853", "dopri5", "radau", "generalized-alpha"]
     loops = [loop(name, integrator=name, sample_time=2e-3, controller=[control]) for name in names]
     solution = solve_scene(held_link(paper_link(count=3), *loops, end=0.04))

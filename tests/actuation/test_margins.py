@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from beam_links import beam_link, tube
-from loop_scenes import INERTIA, T, wheel
+from loop_scenes import INERTIA, T, loop, wheel
 from scipy.linalg import expm
 
 from ffrobot.actuation.control.linear_model import LinearModel, locked_frequencies, sampled
@@ -128,19 +128,19 @@ def test_amplifiers_are_in_the_loop():
     np.testing.assert_allclose((model.A @ x + model.B @ u)[:2], alone, rtol=1e-12)
 
 
-def simulated(rng_seed, gains, sample_time, delay, kick=1e-4):
-    """Record of the nonlinear loop about rest, from a small blow on the tip."""
-    loop = {
-        "name": "loop", "kind": "closed-loop", "actuation": "rest", "sample_time": sample_time, "delay": delay,
-        "controller": [{"kind": "joint-pid"} | gains],
-        "disturbance": [{"point": "a0.tip", "y": f"where(t <= 0.01, {kick}, 0)"}],
-    }  # fmt: skip
-    rest = {"name": "rest", "kind": "pcid", "end": 2.0, "output_step": 0.01}
-    arm = links(
-        np.random.default_rng(rng_seed), 1, 0.2, [0.01], [rest, loop], modes=2,
-        trajectory=[{"name": "still", "joint": "J0", "value": "0.3"}],
-    )  # fmt: skip
-    return solve_scene(arm).outcomes["loop"].details
+def blown(gains, rotor, kick, *analyses, end, modes, **keys):
+    """Solution of the nonlinear loop of an arm about rest, from a small blow on the tip."""
+    disturbance = [{"point": "a0.tip", "y": f"where(t <= 0.01, {kick}, 0)"}]
+    control = loop(actuation="rest", controller=[{"kind": "joint-pid"} | gains], disturbance=disturbance, **keys)
+    rest = {"name": "rest", "kind": "pcid", "end": end, "output_step": 0.01}
+    path = [{"name": "still", "joint": "J0", "value": "0.3"}]
+    of_arm = np.random.default_rng(3), 1, 0.2, [rotor], [rest, *analyses, control], modes
+    return solve_scene(links(*of_arm, trajectory=path))
+
+
+def simulated(gains, sample_time, delay):
+    solution = blown(gains, 0.01, 1e-4, end=2.0, modes=2, sample_time=sample_time, delay=delay)
+    return solution.outcomes["loop"].details
 
 
 def shaking(record):
@@ -161,7 +161,7 @@ def grows(record, calm):
 @pytest.mark.parametrize("delay", [pytest.param(0.0, marks=pytest.mark.nightly), 0.003])
 def test_margin_is_where_the_simulated_loop_begins_to_grow(delay, scaled):
     sample_time, gains = 0.002, {"proportional": {"J0": 2.0}, "derivative": {"J0": 0.2}}
-    record = simulated(3, gains, sample_time, delay)
+    record = simulated(gains, sample_time, delay)
     assert (record.metrics.verdict, record.advice) == ("stable", ())
     factor, later = record.margins.gain, record.margins.delay
     assert 1.0 < factor < 1e3
@@ -169,9 +169,9 @@ def test_margin_is_where_the_simulated_loop_begins_to_grow(delay, scaled):
     for part in (0.93, 1.07):
         if scaled == "gains":
             larger = {what: {"J0": part * factor * of["J0"]} for what, of in gains.items()}
-            found = simulated(3, larger, sample_time, delay)
+            found = simulated(larger, sample_time, delay)
         else:
-            found = simulated(3, gains, sample_time, delay + part * later)
+            found = simulated(gains, sample_time, delay + part * later)
         assert grows(found, record) == (part > 1.0)
 
 
@@ -213,19 +213,12 @@ def test_suggested_gains_hold_the_simulated_arm():
 
 def test_a_loop_that_diverges_says_why_and_what_to_start_with():
     """No rotor, gains for the rigid arm: the root of the link turns at once. With the gains it names it is stable."""
-    loop = {
-        "name": "loop", "kind": "closed-loop", "actuation": "rest", "sample_time": 0.001,
-        "controller": [{"kind": "joint-pid", "proportional": {"J0": 500.0}, "derivative": {"J0": 50.0}}],
-        "disturbance": [{"point": "a0.tip", "y": "where(t <= 0.01, 0.01, 0)"}],
-    }  # fmt: skip
-    rest = {"name": "rest", "kind": "pcid", "end": 3.0, "output_step": 0.01}
-    path = [{"name": "still", "joint": "J0", "value": "0.3"}]
-    linear = {"name": "linear", "kind": "linear", "about": "rest", "times": [0.0]}
 
-    def arm(loop):
-        return solve_scene(links(np.random.default_rng(3), 1, 0.2, [0.0], [rest, linear, loop], trajectory=path))
+    def arm(P, D):
+        gains, linear = {"proportional": {"J0": P}, "derivative": {"J0": D}}, LINEAR | {"about": "rest", "times": [0.0]}
+        return blown(gains, 0.0, 0.01, linear, end=3.0, modes=3, sample_time=0.001)
 
-    solution = arm(loop)
+    solution = arm(500.0, 50.0)
     record = solution.outcomes["loop"].details
     assert record.metrics.verdict == "diverges"
     assert record.margins.radius > 1.0 > record.margins.gain
@@ -234,5 +227,4 @@ def test_a_loop_that_diverges_says_why_and_what_to_start_with():
     assert light_roots(solution.outcomes["linear"].details.models) == ["J0"]
     (start,) = [text for text in advice if text.startswith("start with ")]
     P, D = (float(start.split(f"{what} = {{ J0 = ")[1].split(" }")[0]) for what in ("proportional", "derivative"))
-    calm = {"kind": "joint-pid", "proportional": {"J0": P}, "derivative": {"J0": D}}
-    assert arm(loop | {"controller": [calm]}).outcomes["loop"].details.metrics.verdict == "stable"
+    assert arm(P, D).outcomes["loop"].details.metrics.verdict == "stable"

@@ -14,6 +14,13 @@ from ffrobot.exchange.export import export_file
 from ffrobot.scene.load import make_scene
 
 
+def table_in_c(results, folder):
+    """The text of an exported controller, and its numbers A."""
+    export_file(results, "c", "loop", folder / "c.h")
+    text = (folder / "c.h").read_text()
+    return text, np.array(re.search(r"double A\[\] = \{(.*?)\}", text, re.DOTALL)[1].split(","), dtype=float)
+
+
 def test_a_loop_with_an_observer_is_its_exact_discrete_model():
     """Angle by encoder, rate and a constant moment estimated, which is rejected; a command acts 4 ms late."""
     moment, drift, delay, seed = 0.3, 2.0, 0.004, 7
@@ -62,11 +69,9 @@ def test_controller_and_observer_are_one_system_in_discrete_time(tmp_path, late)
     saved = np.load(tmp_path / "c.npz")
     np.testing.assert_array_equal(saved["A"], system.A)
     assert saved["sample_time"] == pytest.approx(T)
-    export_file(tmp_path / "w.results.h5", "c", "loop", tmp_path / "c.h")
-    text = (tmp_path / "c.h").read_text()
+    text, numbers = table_in_c(tmp_path / "w.results.h5", tmp_path)
     assert f"#define N_X {len(system.A)}" in text
-    numbers = re.search(r"double A\[\] = \{(.*?)\}", text, re.DOTALL)[1].split(",")
-    np.testing.assert_array_equal(np.array(numbers, dtype=float), system.A.ravel())
+    np.testing.assert_array_equal(numbers, system.A.ravel())
     with pytest.raises(
         InputError, match=r'found none; the name of closed-loop control \("loop"\) selects its controllers'
     ):
@@ -135,12 +140,10 @@ def test_a_scheduled_controller_is_a_table_of_systems(tmp_path):
         off.append(np.abs(commanded - found).max() / np.abs(found).max())
     assert off[0] < 5e-3
     assert off[1] < off[0] / 10
-    export_file(tmp_path / "3.h5", "c", "loop", tmp_path / "c.h")
-    text = (tmp_path / "c.h").read_text()
+    text, numbers = table_in_c(tmp_path / "3.h5", tmp_path)
     assert "#define N_TIME 3" in text
-    numbers = re.search(r"double A\[\] = \{(.*?)\}", text, re.DOTALL)[1].split(",")
     controllers = ffrobot.Results(tmp_path / "3.h5").controllers("loop")
-    np.testing.assert_array_equal(np.array(numbers, dtype=float), np.ravel([of.A for of in controllers]))
+    np.testing.assert_array_equal(numbers, np.ravel([of.A for of in controllers]))
 
 
 @pytest.mark.parametrize(

@@ -3,23 +3,17 @@
 import numpy as np
 import pytest
 from beam_links import modal_body, paper_link, rectangle
-from patches_on_links import SCENE, planar_body
+from patches_on_links import SCENE, layout, planar_body
 
 from ffrobot.actuation.patches.composite import patched_body, structure_effect_of
 from ffrobot.actuation.patches.link_patches import placed_patches
-from ffrobot.actuation.patches.records import PztLayout
 
 E, RHO, H, B = 2.068427e11, 7850.0, 0.015, 0.025
 E_P, RHO_P, T_P = 63e9, 7600.0, 0.75e-3
 
 
-def layout(**keys):
-    tables = {"count": 10, "length": 0.05, "width": B, "thickness": T_P, "modulus": E_P, "d31": 110e-12}
-    return PztLayout(body="link", density=RHO_P, **(tables | keys))
-
-
-def with_patches(bare, body, one):
-    return patched_body(bare, body, placed_patches(SCENE, [one], body))
+def with_patches(bare, body, **keys):
+    return patched_body(bare, body, placed_patches(SCENE, [layout(density=RHO_P, **keys)], body))
 
 
 def composite_link(faces, mass, stiffness):
@@ -52,7 +46,7 @@ def test_frequencies_are_those_of_the_composite_link(cantilever, face, structura
     """Ritz with 20 modes of the bare link: curvature has steps at patch edges that smooth modes only come near."""
     body = cantilever(20)
     bare = planar_body(body)
-    patched = with_patches(bare, body, layout(face=face, structural=structural))
+    patched = with_patches(bare, body, face=face, structural=structural)
     reference = composite_link(2 if face else 1, "mass" in structural, "stiffness" in structural)
     effect = structure_effect_of(bare, patched)
     ritz, exact = effect.frequency[1, :5], reference.frequency[:5]
@@ -70,7 +64,7 @@ def test_modes_stay_orthonormal_and_the_transform_goes_back(cantilever):
     """Φ of the patched link is Φ of the file times the transform; its invariants are sums over the same points."""
     body = cantilever(10)
     bare = planar_body(body)
-    patched = with_patches(bare, body, layout(structural=("mass", "stiffness")))
+    patched = with_patches(bare, body, structural=("mass", "stiffness"))
     tip = body.interfaces["tip"].translation[:2] @ patched.modal_transform
     np.testing.assert_allclose(patched.points["tip"].translation[:2], tip, atol=1e-12)
     np.testing.assert_allclose(patched.S_bar_kl[0, 0] + patched.S_bar_kl[1, 1], np.eye(10), atol=1e-12)

@@ -1,11 +1,11 @@
 """Patches in 3D on a link from stage 1: closed forms of bending in both planes and of twist, and what is refused."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from beam_links import beam_link, modal_body, rectangle, tube
+from patches_on_links import SCENE
 
 from ffrobot.actuation.patches.composite import patched_body
 from ffrobot.actuation.patches.link_patches import check_reach, link_patches, placed_patches
@@ -15,7 +15,6 @@ from ffrobot.common.validation import validate
 from ffrobot.fe_models.beam.section_stress import surface_shear
 from ffrobot.mbs.model.body import from_modal_body
 
-SCENE = Path("scene.toml")
 E, NU, L = 70e9, 0.33, 0.4
 G = E / (2 * (1 + NU))
 START, END, VOLT, WIDE = 0.06, 0.14, 100.0, 0.005
@@ -39,9 +38,13 @@ def layout(**keys):
     return validate(PztLayout, material | tables, SCENE)
 
 
+def patched(body, layouts):
+    return patched_body(from_modal_body("link", body), body, placed_patches(SCENE, layouts, body))
+
+
 def tip(body, layouts, volts=None):
     """Φp (3,) and Φ_r p (3,) of the tip under a voltage on all patches, statically, with what the patches stiffen."""
-    spatial = patched_body(from_modal_body("link", body), body, placed_patches(SCENE, layouts, body))
+    spatial = patched(body, layouts)
     found = link_patches(SCENE, layouts, body, spatial)
     V = np.full(found.Phi_V.shape[1], VOLT) if volts is None else np.asarray(volts, dtype=float)
     p = spatial.modal_transform.T @ (found.Phi_V @ V) / spatial.stiffness
@@ -197,9 +200,7 @@ def test_overlap_of_layouts_is_shared():
 def test_round_links_do_not_mix_their_planes():
     """Frequencies in the two planes are equal; patches in one leave the other's modes alone, payload or not."""
     body = link(TUBE)
-    spatial = patched_body(
-        from_modal_body("link", body), body, placed_patches(SCENE, [layout(structural=True, density=7600.0)], body)
-    )
+    spatial = patched(body, [layout(structural=True, density=7600.0)])
     families = np.array(body.family)
     assert not spatial.modal_transform[families[:, None] != families].any()
 
@@ -208,7 +209,7 @@ def test_mass_of_layers():
     """∫ρ(y² + z²) over the layers; modes stay orthonormal."""
     body = link(SQUAT)
     keys = {"count": 5, "length": 0.05, "structural": True, "density": 7600.0, "face": "both"}
-    spatial = patched_body(from_modal_body("link", body), body, placed_patches(SCENE, [layout(**keys)], body))
+    spatial = patched(body, [layout(**keys)])
     A, I = 2 * WIDE * 0.5e-3, 2 * WIDE * (0.0035**3 - 0.003**3) / 3  # noqa: E741
     assert spatial.mass - body.mass == pytest.approx(5 * 0.05 * 7600.0 * A, rel=1e-9)
     layers = 5 * 0.05 * 7600.0 * (I + A * WIDE**2 / 12)

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from beam_links import paper_link
-from loop_scenes import INERTIA, T, wheel
+from loop_scenes import INERTIA, T, loop, wheel
+from one_link import one_link
 
 import ffrobot
 from ffrobot.actuation.control.records import Sensor
@@ -66,7 +67,7 @@ def test_accelerometer_and_gyro_against_differences_of_the_motion(space):
         joint=[{"name": "O", "type": "revolute", "between": ["ground", "rod.root"]} | axis],
         trajectory=[{"name": "swing", "joint": "O", "value": "0.9*sin(2*t)"}],
         analysis=[{"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": T, "tolerance": 1e-9},
-                  {"name": "loop", "kind": "closed-loop", "actuation": "inverse", "sample_time": T, "sensor": sensors}],
+                  loop(sensor=sensors)],
     ))  # fmt: skip
     t, h = results["loop/control/time"][()], 1e-3
     angle = lambda t: 0.9 * np.sin(2 * t)  # noqa: E731
@@ -83,14 +84,9 @@ def test_accelerometer_and_gyro_against_differences_of_the_motion(space):
 def test_strain_is_stress_over_modulus():
     """On the lower side of a beam under a force at its tip, which its attachment modes carry exactly."""
     link = paper_link(attachment_modes=True, count=3, stress={"points": {"gauge": [0.2, -0.0075, 0.0]}})
-    results = ffrobot.solve(make_scene(
-        name="held", gravity=[0.0, 0.0], body=[{"name": "link", "link": link}],
-        joint=[{"name": "O", "type": "weld", "between": ["ground", "link.root"]}],
-        load=[{"point": "link.tip", "y": "10"}], initial={"state": "static"},
-        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.02, "output_step": 0.01},
-                  {"name": "loop", "kind": "closed-loop", "actuation": "inverse", "sample_time": 0.01,
-                   "sensor": [{"strain": "link.gauge"}]}],
-    ))  # fmt: skip
+    inverse = {"name": "inverse", "kind": "pcid", "end": 0.02, "output_step": 0.01}
+    keys = {"load": [{"point": "link.tip", "y": "10"}], "initial": {"state": "static"}}
+    results = ffrobot.solve(one_link("link", link, inverse, loop(sensor=[{"strain": "link.gauge"}]), **keys))
     stress = results["loop/stress/link/points/gauge/stress"][0, 0]
     by_hand = 10.0 * (1.0 - 0.2) * 0.0075 / (0.025 * 0.015**3 / 12)
     assert abs(stress) == pytest.approx(by_hand, rel=1e-6)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
+from links import quintic
 
 import ffrobot as library
 from ffrobot.actuation import feasibility
@@ -19,28 +20,19 @@ def link(name, length, height):
     )  # fmt: skip
 
 
-def quintic(start, end, duration):
-    s = f"(t/{duration})"
-    return f"{float(start)!r}+{float(end - start)!r}*(10*{s}**3-15*{s}**4+6*{s}**5)"
-
-
 def chain(lengths, heights, angles, payload, joint, trajectory, analysis):
     names = [f"link{k}" for k in range(1, len(lengths) + 1)]
     ends = ["ground", *(f"{name}.tip" for name in names)]
+    joints = [
+        {"name": f"J{k}", "type": "revolute", "between": [end, f"{name}.root"], **joint}
+        for k, (end, name) in enumerate(zip(ends[:-1], names, strict=True), 1)
+    ]
     return library.make_scene(
-        name="chain",
-        space="planar",
-        gravity=[0.0, -9.81],
+        name="chain", space="planar", gravity=[0.0, -9.81], joint=joints, trajectory=trajectory, analysis=analysis,
         body=[{"name": n, "link": link(n, *of)} for n, *of in zip(names, lengths, heights, strict=True)],
-        joint=[
-            {"name": f"J{k}", "type": "revolute", "between": [end, f"{name}.root"], **joint}
-            for k, (end, name) in enumerate(zip(ends[:-1], names, strict=True), 1)
-        ],
         payload=[{"point": f"{names[-1]}.tip", "mass": payload}],
         initial={"state": "static", "angles": dict(zip(names, angles, strict=True))},
-        trajectory=trajectory,
-        analysis=analysis,
-    )
+    )  # fmt: skip
 
 
 def place(lengths, angles):
