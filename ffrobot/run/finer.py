@@ -8,11 +8,12 @@ import numpy as np
 from ..common.errors import InputError
 from ..fe_models.link_source import LinkTable, link_keys, link_path
 from ..mbs.analysis.forward import Forward, actuator_commands, largest_moments
-from ..mbs.analysis.operating_points import locked_motors, open_loop_growth
+from ..mbs.analysis.operating_points import open_loop_growth
 from ..mbs.linear.statics import static_equilibrium
 from ..mbs.model.drives import Drives, Replayed
 from ..mbs.model.known_motion import State
 from ..mbs.model.model import Model
+from ..mbs.posture.prescribed import following_motors
 from ..mbs.posture.redundancy import resolved
 from ..mbs.posture.start import undeformed_posture
 from ..mbs.quantities.motion import section_motion
@@ -117,10 +118,10 @@ def _start(source: Run, finer: Model) -> State:
     if any(row.is_trajectory for row in source.model.rows):
         model = resolved(finer, source.analysis.last_time)
     else:
-        alone, q = finer.without_paths(), np.zeros(finer.tree.n_q)
-        for node, other in zip(alone.tree.nodes, nodes, strict=True):
+        q = np.zeros(finer.tree.n_q)
+        for node, other in zip(finer.tree.nodes, nodes, strict=True):
             q[node.q] = source.q[0, other.q]
-        model = replace(alone, rows=(*alone.rows, *locked_motors(alone, q)))
+        model = following_motors(finer, q)
     start = undeformed_posture(model)
     return static_equilibrium(model, start) if any(source.q[0, node.p_q].any() for node in nodes) else start
 

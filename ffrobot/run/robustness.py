@@ -15,7 +15,6 @@ from ..common.arrays import Array
 from ..common.errors import SolveError
 from ..common.structs import struct
 from ..mbs.analysis.forward import Forward
-from ..mbs.analysis.operating_points import locked_motors
 from ..mbs.joints.joint import GearedJoint, stiffer
 from ..mbs.linear.statics import static_equilibrium
 from ..mbs.model.body import scaled
@@ -23,6 +22,7 @@ from ..mbs.model.build import build_model
 from ..mbs.model.gears import elastic_joints, with_compliance
 from ..mbs.model.known_motion import State, mass_matrices
 from ..mbs.model.model import Model
+from ..mbs.posture.prescribed import following_motors
 from ..mbs.run.context import place_of
 from ..mbs.run.gears import with_motor_coordinates
 from ..mbs.run.record import Run
@@ -185,7 +185,7 @@ class _Runs:
         q = start.q.copy()
         for node in alone.tree.nodes:
             q[node.p_q] = 0.0
-        return static_equilibrium(replace(alone, rows=(*alone.rows, *locked_motors(alone, q))), State(q, 0.0 * start.v))
+        return static_equilibrium(following_motors(alone, q), State(q, 0.0 * start.v))
 
     def worst(self, run: Callable[[Model], Run], robots: Sequence[Model]) -> float:
         """The largest distance, m, of the followed points from where they are to be; infinite where a run fails."""

@@ -12,14 +12,13 @@ from pydantic import Field
 from ...common.arrays import Array
 from ...common.errors import InputError, SolveError, did_you_mean, quoted
 from ...common.structs import struct
-from .._core import TimeFunction
 from ..fields.field_types import NotNegative, PointReference
 from ..linear.joint_conditions import JointCondition, joint_conditions, robot_modes
 from ..linear.linearisation import LinearEquations
 from ..linear.statics import Statics
 from ..model.gears import with_compliance, with_prescribed_motors
 from ..model.model import Model
-from ..model.nodes import ConstraintRow, rows_of_joint
+from ..posture.prescribed import following_motors
 from ..posture.redundancy import resolved
 from ..posture.start import undeformed_posture
 from ..run.context import Context, place_of
@@ -125,8 +124,7 @@ def find_operating_points(context: Context, analysis: InstantAnalysis) -> tuple[
     if analysis.source is None:
         model = context.model
         if not any(row.is_trajectory for row in model.rows):
-            rows = (*model.rows, *locked_motors(model, undeformed_posture(model).q))
-            context = replace(context, model=replace(model, rows=rows))
+            context = replace(context, model=following_motors(model, undeformed_posture(model).q))
         run = run_static(context, analysis)
         return run, linear_states(model, run, [0])
     source = context.outcomes[analysis.source]
@@ -197,16 +195,6 @@ def row_at(path: Path, analysis: Analysis, source: Run, t: float) -> int:
             f"{t:g}",
         )
     return row
-
-
-def locked_motors(model: Model, q: Array) -> list[ConstraintRow]:
-    """Rows that keep the coordinates of motors where they are at q (n_q,)."""
-    rows: list[ConstraintRow] = []
-    for joint, columns in model.motors.items():
-        node = model.driven(joint)
-        now = q[node.q.start + columns - node.v.start]
-        rows += rows_of_joint(joint, node, columns, [TimeFunction.constant(float(value)) for value in now])
-    return rows
 
 
 @struct

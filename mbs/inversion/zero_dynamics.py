@@ -34,11 +34,8 @@ class LinearDynamics:
 
     def __call__(self, times: Array) -> tuple[Array, Array, Array]:
         """M, D, K at any times, straight lines between those that are known."""
-        right = np.clip(np.searchsorted(self.times, times), 1, len(self.times) - 1)
-        left = right - 1
-        width = self.times[right] - self.times[left]
-        share = np.clip((times - self.times[left]) / width, 0.0, 1.0)[:, None, None]
-        M, D, K = ((1 - share) * x[left] + share * x[right] for x in (self.M, self.D, self.K))
+        inside = times.clip(self.times[0], self.times[-1])
+        M, D, K = (scipy.interpolate.make_interp_spline(self.times, x, 1)(inside) for x in (self.M, self.D, self.K))
         return M, D, K
 
 

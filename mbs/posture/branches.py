@@ -134,13 +134,10 @@ def in_words(branch: Mapping[str, Word]) -> str:
 
 def is_so(model: Model, q: Array, node: Node, word: Word) -> bool:
     """Whether `word`, such as "up" or "flip", describes the joint of `node` in the posture q (n_q,), rad and m."""
-    if word in ("up", "down"):
-        return _above(model, q, node) == (word == "up")
-    if word in ("left", "right"):
-        return _raises(model, q, node) == (word == "right")
-    if word in ("flip", "noflip"):
-        return _flips(model, q, node) == (word == "flip")
-    return (_angle(q, node) >= 0.0) == (word == "positive")
+    if word in ("positive", "negative"):
+        return (_angle(q, node) >= 0.0) == (word == "positive")
+    tell = _above if word in ("up", "down") else _raises if word in ("right", "left") else _flips
+    return tell(model, q, node) == (word in ("up", "right", "flip"))
 
 
 def _angle(q: Array, node: Node) -> float:

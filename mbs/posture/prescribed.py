@@ -8,6 +8,7 @@ import numpy as np
 from ...common.arrays import Array, as_list
 from ...common.errors import SolveError
 from .. import _core
+from .._core import TimeFunction
 from ..model.model import Model
 from ..model.nodes import rows_of_joint
 from ..model.system import frame_share, turning_motors
@@ -23,12 +24,15 @@ class Prescribed(NamedTuple):
     required: Array
 
 
-def following_motors(model: Model) -> Model:
-    """The robot with the coordinates of its motors in place of its paths."""
+def following_motors(model: Model, q: Array | None = None) -> Model:
+    """The robot with the coordinates of its motors in place of its paths, kept as at q (n_q,) where that is given."""
     rows = [row for row in model.rows if not row.is_trajectory]
     for joint, coordinates in model.motors.items():
         node = model.driven(joint)
-        rows += rows_of_joint(joint, node, coordinates, (None,) * len(coordinates))
+        targets: list[TimeFunction | None] = [None] * len(coordinates)
+        if q is not None:
+            targets = [TimeFunction.constant(value) for value in q[node.q.start + coordinates - node.v.start].tolist()]
+        rows += rows_of_joint(joint, node, coordinates, targets)
     return replace(model, rows=tuple(rows))
 
 
