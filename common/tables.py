@@ -5,7 +5,7 @@ import io
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import date, time
-from typing import Any, NamedTuple
+from typing import Any
 
 DEEPEST = 32  # tables and lists within each other
 LONGEST_TEXT = 20_000  # characters; expressions have a limit of their own below this
@@ -14,11 +14,8 @@ SMALLEST = 1e-30  # of what has to be positive
 LARGEST_INTEGER = 2**63 - 1  # TOML promises no more
 
 
-class CsvTable(NamedTuple):
-    """Cells of a CSV file, without blanks around them: the header, and the rows below it with their lines."""
-
-    header: list[str]
-    rows: list[tuple[int, list[str]]]
+CsvTable = tuple[list[str], list[tuple[int, list[str]]]]
+"""Cells of a CSV file, without blanks around them: the header, and the rows below it with their lines."""
 
 
 COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?|[-+]?\d+,([eE][-+]?\d+)?")
@@ -47,7 +44,7 @@ def parse_csv(text: str) -> CsvTable:
     is_table = len(header[1]) > 1 and all(map(NAME.fullmatch, header[1]))
     if header[1] and not (is_table or any(_is_number(cell) for _, row in below for cell in row)):
         raise csv.Error("expected names of columns and numbers below, found other text")  # which is not for messages
-    return CsvTable(header[1], below)
+    return header[1], below
 
 
 NAME = re.compile(r"[\w .,;/°µ()\[\]-]{0,100}")

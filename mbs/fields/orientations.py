@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...common.arrays import Array, as_list
+from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.rotations import exponential, logarithm, of_quaternion, quaternions
 from ...common.structs import struct
@@ -69,5 +69,5 @@ def about_their_middle(A: Array, each: str) -> tuple[Array, Reference]:
             f"{each} {far.argmax() + 1}: expected orientations within {np.degrees(WIDEST):.0f} degrees of their middle",
             f"{np.degrees(far.max()):.0f}: divide the motion, or give rotation_vector or rpy as expressions",
         )
-    x, y, z = as_list(logarithm(middle))
+    x, y, z = logarithm(middle).tolist()
     return psi, (x, y, z)

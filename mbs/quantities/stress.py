@@ -145,11 +145,6 @@ def mode_acceleration(
     return Recovery(METHODS[1], p - p_s, names, sizes, sections)
 
 
-def has_stresses(body: ModalBody) -> bool:
-    """Whether its file holds stresses of modes anywhere."""
-    return bool(body.stress) or body.surface_stress is not None
-
-
 def body_stress(body: ModalBody, recovery: Recovery) -> BodyStress:
     """Return stresses over a motion wherever the file of `body` has those of modes."""
     points = {}

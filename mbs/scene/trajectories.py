@@ -1,6 +1,6 @@
 """Trajectories of a scene, key by key: motion that is specified. SI units; angles in rad."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cached_property
 from itertools import pairwise
 from math import inf
@@ -77,11 +77,26 @@ class Shaper(Record):
         return motion
 
 
-class MotionKeys(Referring):
-    """Keys of the motion of a trajectory: when it passes which places, and how fast."""
+PLACES = ("x", "y", "z")
+SUBJECTS = ("point", "joint", "angle", "motor")
+ORIENTATIONS = ("rotation_vector", "rpy", "direction")
+POSE = 6
+OF_POINT = {2: "places [x, y]", 3: "[x, y, z]", POSE: "[x, y, z, roll, pitch, yaw]"}
+"""How `via` of a point is written, by the number of components."""
+OfPlane = Annotated[Place, Spelled(Quantity | tuple[Quantity, Quantity])]
+Triple = tuple[Expression, Expression, Expression]
 
-    via: Annotated[tuple[Place, ...], OfPlaces] | None = None
-    """Waypoints from rest to rest, the first at t = 0: of points (m), or values of what turns or slides."""
+
+class Trajectory(Referring):
+    """Prescribed motion of a point (m, global axes), of the section there, of an absolute angle, a joint or a motor.
+
+    The section's axes in global axes are prescribed by a rotation vector, by roll, pitch and yaw about
+    fixed axes, or by one direction of the section. The rotation about this direction is then unconstrained.
+    """
+
+    via: Annotated[tuple[OfPlane, ...], OfPlaces] | None = None
+    """Waypoints from rest to rest, the first at t = 0: [x, y] (m), or values of the joint or angle (rad, m). In 3D
+    scenes also [x, y, z], and [x, y, z, roll, pitch, yaw] (m, rad); [x, y] does not prescribe z."""
     profile: Literal["rest-to-rest", "s-curve", "trapezoid", "spline"] | None = None
     """Law of motion between waypoints: a polynomial (default of `via`), limited jerk, limited acceleration, or a spline
     through the rows of `waypoints` (their default)."""
@@ -108,102 +123,6 @@ class MotionKeys(Referring):
     """
     shaper: Shaper | None = None
     """Input shaper that does not excite vibrations of certain frequencies."""
-
-    @field_validator("waypoints", check_fields=False)
-    @classmethod
-    def _of_its_joint(cls, table: Waypoints | None, info: ValidationInfo) -> Waypoints | None:
-        joint = info.data.get("joint") or info.data.get("motor")
-        return table if table is None or joint is None else table.of_joint(joint)
-
-    def check_motion(self, places: Mapping[int, str], waypoints: Waypoints | None) -> None:
-        """Raise `ValueError` for keys that do not fit each other, or places that are none of these.
-
-        `places` says by their number of components how they are written.
-        """
-        given = [key for key in (*OF_LEGS, "profile", "smoothness", "shaper") if key in self.model_fields_set]
-        if self.via is None and waypoints is None and given:
-            raise ValueError(f'expected {quoted(given)} only with "via" or "waypoints", found neither')
-        if waypoints is not None:
-            if refused := [key for key in given if key in OF_LEGS]:
-                raise ValueError(f'expected {quoted(refused)} only with "via", found them with "waypoints"')
-            if self.profile in (None, "spline") and self.smoothness is not None:
-                raise ValueError('expected no key "smoothness" with profile = "spline", found it there')
-        if self.via is not None:
-            self._check_via(self.via, places)
-
-    def _check_via(self, via: tuple[Place, ...], places: Mapping[int, str]) -> None:
-        sizes = {int(np.size(place)) for place in via}
-        if not sizes <= set(places) or len(sizes) > 1:
-            wanted = " or ".join(places.values()) + (", all alike," if len(places) > 1 else "")
-            raise ValueError(f"expected {wanted} in via, found {[list(p) if isinstance(p, tuple) else p for p in via]}")
-        if self.profile == "spline":
-            raise ValueError('expected profile = "spline" only with "waypoints", found it with "via"')
-        for k, (place, following) in enumerate(pairwise(via), 1):
-            if place == following:
-                raise ValueError(f"expected places in via that differ (a rest is a hold), found no. {k} twice")
-        for key, count in (("duration", len(via) - 1), ("hold", len(via) - 2)):
-            value = getattr(self, key)
-            if isinstance(value, tuple) and len(value) != count:
-                raise ValueError(f'expected {count} numbers in "{key}", found {len(value)}')
-        if self.fastest and "stretch" in self.model_fields_set:
-            raise ValueError('expected one of the keys "fastest" and "stretch", found both')
-        if bool(self._limits) == (self.duration is not None):
-            given = "both" if self._limits else "neither"
-            raise ValueError(f'expected either limits ({quoted(LIMITS)}) or a "duration" with "via", found {given}')
-        if self.profile in ("s-curve", "trapezoid") and self._limits == ["speed"]:
-            raise ValueError(f'expected "acceleration" or "jerk" with profile = "{self.profile}", found only "speed"')
-        if self.profile == "trapezoid" and self.jerk is not None:
-            raise ValueError('expected no "jerk" with profile = "trapezoid" (its acceleration jumps), found it')
-
-    @property
-    def _limits(self) -> list[str]:
-        return [key for key in LIMITS if getattr(self, key) is not None]
-
-    def along_table(self, waypoints: Waypoints) -> Piecewise:
-        """The motion of all columns of a table."""
-        if self.profile in (None, "spline"):
-            return self._shaped(waypoints.spline)
-        times = waypoints.times
-        return self._through(waypoints.values, float(times[0]), np.diff(times))
-
-    def through(self, places: Array) -> Piecewise:
-        """Return the motion through the points of `via` (k + 1, n), m or rad, or some of their components."""
-        return self._through(places, self.start, self.duration)
-
-    def _shaped(self, motion: Piecewise) -> Piecewise:
-        return motion if self.shaper is None else self.shaper.shape(motion)
-
-    def _through(self, places: Array, start: float, duration: float | Sequence[float] | Array | None) -> Piecewise:
-        profile, count = self.profile or "rest-to-rest", len(places) - 1
-        assert profile != "spline"
-        limits = PathLimits(*(inf if value is None else value for value in (self.speed, self.acceleration, self.jerk)))
-        durations = None if duration is None else tuple(np.broadcast_to(duration, count).tolist())
-        holds = tuple(np.broadcast_to(self.hold, count - 1).tolist())
-        smoothness = self.smoothness or SMOOTHNESS[profile]
-        more = {"blend": self.blend, "stretch": self.stretch}
-        return self._shaped(path_of(Legs(places, start, profile, smoothness, limits, durations, holds=holds, **more)))
-
-
-PLACES = ("x", "y", "z")
-SUBJECTS = ("point", "joint", "angle", "motor")
-ORIENTATIONS = ("rotation_vector", "rpy", "direction")
-POSE = 6
-OF_POINT = {2: "places [x, y]", 3: "[x, y, z]", POSE: "[x, y, z, roll, pitch, yaw]"}
-"""How `via` of a point is written, by the number of components."""
-OfPlane = Annotated[Place, Spelled(Quantity | tuple[Quantity, Quantity])]
-Triple = tuple[Expression, Expression, Expression]
-
-
-class Trajectory(MotionKeys):
-    """Prescribed motion of a point (m, global axes), of the section there, of an absolute angle, a joint or a motor.
-
-    The section's axes in global axes are prescribed by a rotation vector, by roll, pitch and yaw about
-    fixed axes, or by one direction of the section. The rotation about this direction is then unconstrained.
-    """
-
-    via: Annotated[tuple[OfPlane, ...], OfPlaces] | None = None
-    """Waypoints from rest to rest, the first at t = 0: [x, y] (m), or values of the joint or angle (rad, m). In 3D
-    scenes also [x, y, z], and [x, y, z, roll, pitch, yaw] (m, rad); [x, y] does not prescribe z."""
     name: Name
     """Name of the trajectory, unique in the scene."""
     point: PointReference | None = None
@@ -243,6 +162,12 @@ class Trajectory(MotionKeys):
 
     refers_to = (("point", "loaded"), ("angle", "loaded"), ("joint", "joint"), ("motor", "joint"))
 
+    @field_validator("waypoints")
+    @classmethod
+    def _of_its_joint(cls, table: Waypoints | None, info: ValidationInfo) -> Waypoints | None:
+        joint = info.data.get("joint") or info.data.get("motor")
+        return table if table is None or joint is None else table.of_joint(joint)
+
     @model_validator(mode="after")
     def _consistent(self, info: ValidationInfo) -> Self:
         subject = one_of(self, keys_here(self, SUBJECTS, info))
@@ -255,13 +180,50 @@ class Trajectory(MotionKeys):
         if self.waypoints is not None:
             self._check_columns(self.waypoints, allowed)
         of_point = {2: OF_POINT[2]} if is_planar(info) else OF_POINT
-        self.check_motion(of_point if subject == "point" else {1: "numbers"}, self.waypoints)
+        self._check_motion(of_point if subject == "point" else {1: "numbers"})
         self._check_orientation()
         with np.errstate(all="ignore"):
             paths = [path for path in (self.path, self._turning) if path is not None]
         if any(not (np.isfinite(path.coefficients).all() and np.isfinite(path.breaks).all()) for path in paths):
             raise ValueError("expected limits and times that fit each other in size, found infinite derivatives")
         return self
+
+    def _check_motion(self, places: Mapping[int, str]) -> None:
+        """`places` says by their number of components how they are written."""
+        given = [key for key in (*OF_LEGS, "profile", "smoothness", "shaper") if key in self.model_fields_set]
+        if self.via is None and self.waypoints is None and given:
+            raise ValueError(f'expected {quoted(given)} only with "via" or "waypoints", found neither')
+        if self.waypoints is not None:
+            if refused := [key for key in given if key in OF_LEGS]:
+                raise ValueError(f'expected {quoted(refused)} only with "via", found them with "waypoints"')
+            if self.profile in (None, "spline") and self.smoothness is not None:
+                raise ValueError('expected no key "smoothness" with profile = "spline", found it there')
+        if self.via is not None:
+            self._check_via(self.via, places)
+
+    def _check_via(self, via: tuple[Place, ...], places: Mapping[int, str]) -> None:
+        sizes = {int(np.size(place)) for place in via}
+        if not sizes <= set(places) or len(sizes) > 1:
+            wanted = " or ".join(places.values()) + (", all alike," if len(places) > 1 else "")
+            raise ValueError(f"expected {wanted} in via, found {[list(p) if isinstance(p, tuple) else p for p in via]}")
+        if self.profile == "spline":
+            raise ValueError('expected profile = "spline" only with "waypoints", found it with "via"')
+        for k, (place, following) in enumerate(pairwise(via), 1):
+            if place == following:
+                raise ValueError(f"expected places in via that differ (a rest is a hold), found no. {k} twice")
+        for key, count in (("duration", len(via) - 1), ("hold", len(via) - 2)):
+            value = getattr(self, key)
+            if isinstance(value, tuple) and len(value) != count:
+                raise ValueError(f'expected {count} numbers in "{key}", found {len(value)}')
+        if self.fastest and "stretch" in self.model_fields_set:
+            raise ValueError('expected one of the keys "fastest" and "stretch", found both')
+        if bool(self._limits) == (self.duration is not None):
+            given = "both" if self._limits else "neither"
+            raise ValueError(f'expected either limits ({quoted(LIMITS)}) or a "duration" with "via", found {given}')
+        if self.profile in ("s-curve", "trapezoid") and self._limits == ["speed"]:
+            raise ValueError(f'expected "acceleration" or "jerk" with profile = "{self.profile}", found only "speed"')
+        if self.profile == "trapezoid" and self.jerk is not None:
+            raise ValueError('expected no "jerk" with profile = "trapezoid" (its acceleration jumps), found it')
 
     def _check_columns(self, waypoints: Waypoints, allowed: tuple[str, ...]) -> None:
         columns = waypoints.columns
@@ -305,6 +267,30 @@ class Trajectory(MotionKeys):
         except InputError as error:
             raise ValueError(f"{key}: {error}") from None
 
+    @property
+    def _limits(self) -> list[str]:
+        return [key for key in LIMITS if getattr(self, key) is not None]
+
+    def _along_table(self, waypoints: Waypoints) -> Piecewise:
+        if self.profile in (None, "spline"):
+            return self._shaped(waypoints.spline)
+        return self._through(waypoints.values, waypoints.times)
+
+    def _shaped(self, motion: Piecewise) -> Piecewise:
+        return motion if self.shaper is None else self.shaper.shape(motion)
+
+    def _through(self, places: Array, times: Array | None = None) -> Piecewise:
+        """The motion through places (k + 1, n), m or rad, at `times` (k + 1,), s, or as `start` and limits say."""
+        profile, count = self.profile or "rest-to-rest", len(places) - 1
+        start, duration = (self.start, self.duration) if times is None else (float(times[0]), np.diff(times))
+        assert profile != "spline"
+        limits = PathLimits(*(inf if value is None else value for value in (self.speed, self.acceleration, self.jerk)))
+        durations = None if duration is None else tuple(np.broadcast_to(duration, count).tolist())
+        holds = tuple(np.broadcast_to(self.hold, count - 1).tolist())
+        smoothness = self.smoothness or SMOOTHNESS[profile]
+        more = {"blend": self.blend, "stretch": self.stretch}
+        return self._shaped(path_of(Legs(places, start, profile, smoothness, limits, durations, holds=holds, **more)))
+
     def changed(self, **keys: object) -> Self:
         """Return the trajectory with some keys replaced."""
         return type(self)(**({key: getattr(self, key) for key in self.model_fields_set} | keys))
@@ -325,17 +311,17 @@ class Trajectory(MotionKeys):
     def path(self) -> Piecewise | None:
         """Polynomial motion of the point or joint; None for expressions."""
         if self.via is not None:
-            return self.through(self._places[:, :3])
+            return self._through(self._places[:, :3])
         if self.waypoints is None:
             return None
         places = [k for k, name in enumerate(self.waypoints.columns) if name not in QUATERNION]
-        whole = self.along_table(self.waypoints)
+        whole = self._along_table(self.waypoints)
         return Piecewise(whole.breaks, whole.coefficients[:, :, places])
 
     @cached_property
     def stopping(self) -> Piecewise | None:
         """Return `path` with a stop at each place; None if it has these stops."""
-        return self.model_copy(update={"blend": 0.0}).through(self._places[:, :3]) if self.blend else None
+        return self.model_copy(update={"blend": 0.0})._through(self._places[:, :3]) if self.blend else None
 
     @cached_property
     def components(self) -> dict[str, TimeFunction]:
@@ -370,12 +356,6 @@ class Trajectory(MotionKeys):
         return None if self.direction is None else OrientationLaw("direction", self.direction)
 
     @property
-    def row_count(self) -> int:
-        """Number of constraints: three for a full orientation, two for a direction."""
-        turning = 0 if self.orientation is None else 2 if self.direction is not None else 3
-        return len(self.components) + turning
-
-    @property
     def largest_turn_of_poses(self) -> float:
         """Largest change of roll, pitch or yaw from one pose in `via` to the next, rad; 0 without poses."""
         return float(np.abs(np.diff(self._places[:, 3:], axis=0)).max()) if self._has_poses else 0.0
@@ -404,5 +384,5 @@ class Trajectory(MotionKeys):
             return None
         vectors = self._turns[0]
         if self.waypoints is not None:
-            return self.along_table(Waypoints(("rx", "ry", "rz"), self.waypoints.times, vectors))
-        return self.through(vectors)
+            return self._along_table(Waypoints(("rx", "ry", "rz"), self.waypoints.times, vectors))
+        return self._through(vectors)

@@ -11,7 +11,7 @@ from dataclasses import KW_ONLY, fields, replace
 
 import numpy as np
 
-from ...common.arrays import Array, Indices, as_list
+from ...common.arrays import Array, Indices
 from ...common.errors import InputError, quoted
 from ...common.structs import struct
 from ..inversion.servo import Servo
@@ -53,7 +53,7 @@ class GearedServo(Servo):
         """R (N, n), N/√kg, and torques (N, motors + k)."""
         r, tau = super().forces(times, p, v, a)
         of_gears = [
-            servo.motion.motion(as_list(times), p, v, a, self.postures(times)).tau[:, [column]]
+            servo.motion.motion(times.tolist(), p, v, a, self.postures(times)).tau[:, [column]]
             for servo, column in zip(self.without, self.gears.columns, strict=True)
         ]
         return r, np.hstack([tau, *of_gears])
@@ -143,7 +143,7 @@ def _check_rotors(servo: GearedServo, ratios: Array) -> None:
     model, gears = servo.model, servo.gears
     times = servo.end * np.linspace(0.0, 1.0, SAMPLES + 2)[1:-1]
     still = np.zeros((SAMPLES, len(servo.scale)))
-    states = servo.motion.motion(as_list(times), still, still, still, servo.postures(times))
+    states = servo.motion.motion(times.tolist(), still, still, still, servo.postures(times))
     spin_up = rotor_torques(model, states, times)
     torques = servo.forces(times, still, still, still)[1]
     for k, joint in enumerate(gears.joints):
