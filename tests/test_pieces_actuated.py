@@ -74,10 +74,9 @@ def test_moments_and_voltages_are_those_of_the_one_link(key, one_and_four):
     assert difference(one_and_four, f"inverse/{key}") < 2e-3
 
 
-def test_datasets_have_the_names_of_the_one_link(one_and_four):
-    one, four = (names_of(file["inverse"]) for file in one_and_four)
-    assert one == four
-    one, four = (names_of(file["robot/linear/modes"]) for file in one_and_four)
+@pytest.mark.parametrize("group", ["inverse", "robot/linear/modes"])
+def test_datasets_have_the_names_of_the_one_link(one_and_four, group):
+    one, four = (names_of(file[group]) for file in one_and_four)
     assert one == four
 
 
@@ -138,12 +137,8 @@ def test_a_closed_loop_acts_on_pieces_and_knows_the_links():
             assert list(one[f"{name}/control"].attrs["outputs"]) == list(two[f"{name}/control"].attrs["outputs"])
         outputs = list(one["loop/control"].attrs["outputs"])
         readings = [file["loop/control/readings"][()] for file in (one, two)]
-        for name, bound in (
-            ("joint/A", 1e-3),
-            ("point/link2.tip/y", 2e-4),
-            ("pzt/link2/2", 1e-2),
-            ("modal/link1/1", 5e-3),
-        ):
+        bounds = {"joint/A": 1e-3, "point/link2.tip/y": 2e-4, "pzt/link2/2": 1e-2, "modal/link1/1": 5e-3}
+        for name, bound in bounds.items():
             a, b = (values[:, outputs.index(name)] for values in readings)
             if name.startswith("pzt"):
                 assert b[0] == pytest.approx(a[0], rel=3e-3)

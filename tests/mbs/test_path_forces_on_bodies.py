@@ -5,6 +5,7 @@ import pytest
 import tree_oracle
 from beam_links import beam_link, rectangle
 from row_wrenches import on_body, row_wrenches
+from tables_3d import Y, Z, joint, revolute, scene
 
 import ffrobot
 from ffrobot.mbs.model.system import path_forces_on_bodies
@@ -15,27 +16,22 @@ MODES = {"count": 4, "family": "all", "attachment_modes": False}
 
 
 def beam(name, condition):
-    return {
-        "name": name,
-        "link": beam_link(0.35, rectangle(0.009, 0.014), 8, condition=condition, name=name, modes=MODES),
-    }  # fmt: skip
+    link = beam_link(0.35, rectangle(0.009, 0.014), 8, condition=condition, name=name, modes=MODES)
+    return {"name": name, "link": link}
 
 
 def arm(trajectories):
     """Links on a revolute, a universal and a prismatic joint; every second joint is named from the outside in."""
     joints = [
-        {"name": "base", "type": "revolute", "between": ["ground", "b0.root"], "axis": [0.0, 0.6, 0.8]},
-        {"name": "elbow", "type": "universal", "between": ["b1.root", "b0.tip"], "axis": [0.0, 0.0, 1.0],
-         "second_axis": [0.0, 1.0, 0.0]},
-        {"name": "slide", "type": "prismatic", "between": ["b1.tip", "b2.root"], "axis": [0.0, 1.0, 0.0]},
-    ]  # fmt: skip
+        revolute("base", "ground", "b0.root", [0.0, 0.6, 0.8]),
+        joint("elbow", "universal", "b1.root", "b0.tip", axis=Z, second_axis=Y),
+        joint("slide", "prismatic", "b1.tip", "b2.root", axis=Y),
+    ]
     bodies = [beam("b0", "cantilever"), beam("b1", "simply-supported"), beam("b2", "cantilever")]
-    scene = ffrobot.make_scene(
-        name="arm", space="spatial", gravity=[0.0, 0.0, -9.81], body=bodies, joint=joints, trajectory=trajectories,
-        initial={"joints": {"base": 0.1, "elbow": [0.2, 0.4], "slide": 0.05}},
-        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01}],
-    )  # fmt: skip
-    return prepare_scene(scene, Watcher()).model
+    inverse = {"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.01}
+    initial = {"joints": {"base": 0.1, "elbow": [0.2, 0.4], "slide": 0.05}}
+    tables = scene(bodies, joints, inverse, trajectory=trajectories, initial=initial)
+    return prepare_scene(ffrobot.make_scene(**tables), Watcher()).model
 
 
 PATHS = {

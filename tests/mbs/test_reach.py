@@ -4,31 +4,26 @@ import tomllib
 
 import numpy as np
 import pytest
+from tables_3d import ORIGIN, Y, revolute, rigid, scene
 
 import ffrobot
 from ffrobot.common.errors import InputError
 
-ROD = {"mass": 2.0, "inertia": [0.01, 0.2, 0.2], "center": [0.35, 0.0, 0.0],
-       "points": {"root": [0.0, 0.0, 0.0], "tip": [0.7, 0.0, 0.0]}}  # fmt: skip
-HUB = {"mass": 1.0, "inertia": [0.01, 0.01, 0.01], "center": [0.0, 0.0, 0.0], "points": {"in": [0.0, 0.0, 0.0]}}
-JOINTS = [
-    {"name": "yaw", "type": "revolute", "between": ["ground", "hub.in"], "axis": [0.0, 0.0, 1.0],
-     "at": [0.1, 0.2, 0.3]},
-    {"name": "lift", "type": "revolute", "between": ["hub.in", "a.root"], "axis": [0.0, 1.0, 0.0]},
-    {"name": "elbow", "type": "revolute", "between": ["a.tip", "b.root"], "axis": [0.0, 1.0, 0.0]},
-]  # fmt: skip
+BODIES = [rigid("hub", **{"in": ORIGIN}),
+          *(rigid(name, 2.0, (0.01, 0.2, 0.2), [0.35, 0.0, 0.0], tip=[0.7, 0.0, 0.0]) for name in "ab")]  # fmt: skip
+JOINTS = [revolute("yaw", "ground", "hub.in", at=[0.1, 0.2, 0.3]),
+          revolute("lift", "hub.in", "a.root", Y), revolute("elbow", "a.tip", "b.root", Y)]  # fmt: skip
 DEAD_CENTER = {"x": "0.7", "y": "0.2", "z": "0.3"}  # of a straight arm in line with it, 0.632 m from the hub
 BENT = {"yaw": 0.3, "lift": -0.4, "elbow": 1.2}
 
 
-def arm(path, guess, joints=JOINTS):
+def arm(path, guess):
     """Two rods of 0.7 m on a turning hub at (0.1, 0.2, 0.3) whose tip follows `path`."""
     analysis = [{"name": name, "kind": "pcid", "end": 0.1, "output_step": 0.01} for name in ("inverse", "again")]
-    bodies = [{"name": "hub", "rigid": HUB}, *({"name": name, "rigid": ROD} for name in "ab")]
+    tip = {"name": "tip", "point": "b.tip"} | path
     return ffrobot.make_scene(
-        name="rods", space="spatial", gravity=[0.0, 0.0, 0.0], body=bodies, joint=joints,
-        trajectory=[{"name": "tip", "point": "b.tip"} | path], initial={"joints": guess}, analysis=analysis,
-    )  # fmt: skip
+        **scene(BODIES, JOINTS, *analysis, gravity=ORIGIN, trajectory=[tip], initial={"joints": guess})
+    )
 
 
 @pytest.mark.parametrize(
@@ -73,9 +68,9 @@ def test_without_a_guess_a_singular_zero_is_left():
     """The same arm without any guess; the note after the run says where it starts. The tip is 0.632 m from the hub."""
     bend = 2 * np.arccos(0.3 / 0.7)
     for branch, sign in ({}, None), ({"elbow": "up"}, 1.0), ({"elbow": "down"}, -1.0):
-        scene = arm(DEAD_CENTER, {})
-        scene = scene.model_copy(update={"initial": scene.initial.model_copy(update={"branch": branch})})
-        with ffrobot.solve(scene) as results:
+        free = arm(DEAD_CENTER, {})
+        free = free.model_copy(update={"initial": free.initial.model_copy(update={"branch": branch})})
+        with ffrobot.solve(free) as results:
             np.testing.assert_allclose(results["inverse/points/b.tip/position"][0], [0.7, 0.2, 0.3], atol=1e-9)
             elbow = results["inverse/joints/elbow/coordinate"][0]
         assert abs(elbow) == pytest.approx(bend, rel=1e-6)

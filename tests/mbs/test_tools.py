@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
 from scipy.spatial.transform import Rotation
+from tables_3d import ORIGIN, X, Y, Z, pin, planar, revolute, rigid, scene
 
 from ffrobot import make_scene, solve
 from ffrobot.common.errors import InputError
@@ -11,6 +12,7 @@ from ffrobot.mbs.model.body import bent_section
 from ffrobot.run.solve import prepare_scene
 
 RPY = (0.4, -0.7, 1.1)
+REST = {"name": "rest", "kind": "static"}
 E, HEIGHT, LENGTH, BEYOND = 70e9, 0.02, 0.6, 0.25
 
 
@@ -20,20 +22,14 @@ def turned(rpy):
 
 def wrist(**keys):
     """Three axes through one point on a column: any orientation of the last body."""
-    body = {"mass": 1.0, "center": [0.0, 0.0, 0.05], "inertia": [0.01, 0.012, 0.009],
-            "points": {"root": [0.0, 0.0, 0.0], "end": [0.1, 0.0, 0.2]}}  # fmt: skip
-    axes, before = {"a": [0.0, 0.0, 1.0], "b": [0.0, 1.0, 0.0], "c": [1.0, 0.0, 0.0]}, ["ground", "a.end", "b.end"]
-    joints = [
-        {"name": f"to_{name}", "type": "revolute", "between": [side, f"{name}.root"], "axis": axis}
-        for (name, axis), side in zip(axes.items(), before, strict=True)
-    ]
-    scene = {
-        "name": "wrist", "space": "spatial", "gravity": [0.0, 0.0, -9.81], "joint": joints,
-        "body": [{"name": name, "rigid": body} for name in axes], "tool": [tool()],
-        "initial": {"joints": {"to_a": 0.3, "to_b": 0.5, "to_c": -0.4}},
-        "analysis": [{"name": "move", "kind": "pcid", "end": 0.5, "output_step": 0.05, "tolerance": 1e-10}],
-    }  # fmt: skip
-    return make_scene(**(scene | keys))
+    bodies = [rigid(name, 1.0, (0.01, 0.012, 0.009), [0.0, 0.0, 0.05], end=[0.1, 0.0, 0.2]) for name in "abc"]
+    sides = (("a", "ground", Z), ("b", "a.end", Y), ("c", "b.end", X))
+    tables = scene(
+        bodies, [revolute(f"to_{name}", side, f"{name}.root", axis) for name, side, axis in sides],
+        {"name": "move", "kind": "pcid", "end": 0.5, "output_step": 0.05, "tolerance": 1e-10},
+        tool=[tool()], initial={"joints": {"to_a": 0.3, "to_b": 0.5, "to_c": -0.4}},
+    )  # fmt: skip
+    return make_scene(**(tables | keys))
 
 
 def tool(**keys):
@@ -78,10 +74,9 @@ def test_payloads_and_joints_on_a_tool_are_in_its_axes():
     at_tool = {"point": "c.gripper", "mass": 2.0, "center": center.tolist(), "inertia": inertia.tolist()}
     by_hand = {"point": "c.end", "mass": 2.0, "center": ([0.05, -0.02, 0.15] + F @ center).tolist(),
                "inertia": (F @ inertia @ F.T).tolist()}  # fmt: skip
-    extra = {"mass": 2.0, "center": center.tolist(), "inertia": inertia.tolist(), "points": {"root": [0.0, 0.0, 0.0]}}
     plain = wrist(trajectory=paths)
     bodies = [*({"name": b.name, "rigid": b.rigid.model_dump(exclude_unset=True)} for b in plain.body),
-              {"name": "extra", "rigid": extra}]  # fmt: skip
+              rigid("extra", 2.0, inertia.tolist(), center)]  # fmt: skip
     joints = [joint.model_dump(exclude_unset=True) for joint in plain.joint]
     weld = {"name": "weld", "type": "weld", "between": ["c.gripper", "extra.root"]}
     found = []
@@ -101,18 +96,6 @@ def link(elements=20, count=4, family="in-plane-bending"):
     return beam_link(LENGTH, rectangle(HEIGHT, 0.03), elements, nu=0.3, name="strip", modes=modes)
 
 
-def strip(**keys):
-    scene = {
-        "name": "strip", "gravity": [0.0, 0.0], "body": [{"name": "strip", "link": link()}],
-        "joint": [{"name": "hub", "type": "revolute", "between": ["ground", "strip.root"]}],
-        "tool": [{"name": "nose", "point": "strip.tip", "at": [BEYOND, 0.0], "angle": 0.6}],
-        "initial": {"joints": {"hub": 0.4}},
-        "trajectory": [{"name": "still", "joint": "hub", "value": "0.4"}],
-        "analysis": [{"name": "rest", "kind": "static"}],
-    }  # fmt: skip
-    return make_scene(**(scene | keys))
-
-
 def test_compliance_at_a_tool_beyond_the_tip():
     """A rigid nose on a cantilever: ∫ (L + d − x)²/EI dx across, L/EI in rotation; in the tool's axes, by F Cᵀ Fᵀ."""
     EI = E * 0.03 * HEIGHT**3 / 12
@@ -121,7 +104,12 @@ def test_compliance_at_a_tool_beyond_the_tip():
     C = np.array([[0.0, 0.0, 0.0], [0.0, across, mixed], [0.0, mixed, LENGTH / EI]])
     c, s = np.cos(0.6), np.sin(0.6)
     own = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    with solve(strip()) as results:
+    tables = planar(
+        [{"name": "strip", "link": link()}], [pin("hub", "ground", "strip.root")], REST, gravity=[0.0, 0.0],
+        tool=[{"name": "nose", "point": "strip.tip", "at": [BEYOND, 0.0], "angle": 0.6}],
+        initial={"joints": {"hub": 0.4}}, trajectory=[{"name": "still", "joint": "hub", "value": "0.4"}],
+    )  # fmt: skip
+    with solve(make_scene(**tables)) as results:
         assert results.has("rest/joints_locked/compliance/strip.tip")
         found = results["rest/joints_locked/compliance/strip.nose"][0]
     np.testing.assert_allclose(found, own @ C @ own.T, rtol=1e-8, atol=1e-14)
@@ -131,14 +119,11 @@ def test_compliance_at_a_tool_beyond_the_tip():
 def test_the_bent_place_of_a_tool_is_exact_to_second_order(arm):
     """With geometric stiffening, u = u_tip + exp(φ~) d but for terms of third order: an eighth of half the bending."""
     blade = link(10, 6, ["in-plane-bending", "out-of-plane-bending", "torsion"])
-    scene = make_scene(
-        name="strip", space="spatial", gravity=[0.0, 0.0, 0.0], geometric_stiffening=True,
-        body=[{"name": "strip", "link": blade}],
-        joint=[{"name": "hub", "type": "revolute", "between": ["ground", "strip.root"], "axis": [0.0, 0.0, 1.0]}],
-        tool=[{"name": "nose", "point": "strip.tip", "at": list(arm)}],
-        analysis=[{"name": "rest", "kind": "static"}],
+    tables = scene(
+        [{"name": "strip", "link": blade}], [revolute("hub", "ground", "strip.root")], REST, gravity=ORIGIN,
+        geometric_stiffening=True, tool=[{"name": "nose", "point": "strip.tip", "at": list(arm)}],
     )  # fmt: skip
-    body = prepare_scene(scene).model.tree.nodes[0].body
+    body = prepare_scene(make_scene(**tables)).model.tree.nodes[0].body
     p = np.random.default_rng(3).normal(size=body.n_modes) / np.sqrt(body.stiffness)
     off = []
     for size in (0.1, 0.05):
