@@ -58,11 +58,6 @@ class Worker:
         self._messages.seek(0)
         return Done(code, self._messages.read().decode(errors="replace"), answered.get("imported", {}))
 
-    @property
-    def is_alive(self) -> bool:
-        """Whether it takes another run."""
-        return self._process.poll() is None
-
     def stop(self) -> None:
         """Ask the current run to end, or, without one, the worker itself."""
         self._process.terminate()
@@ -82,7 +77,7 @@ _own = local()
 def own_worker() -> Worker:
     """The worker of this thread; another one where that has ended, or the folder or the environment has changed."""
     worker: Worker | None = getattr(_own, "worker", None)
-    if worker is None or not worker.is_alive or worker.place != _place():
+    if worker is None or worker._process.poll() is not None or worker.place != _place():
         end_own_worker()
         _own.worker = worker = Worker()
     return worker

@@ -28,7 +28,7 @@ from ..run.watcher import Watcher
 from ..scene.load import load_scene
 from ..sweep.files import Variation, run_files
 from ..sweep.runs import RESULTS, Row
-from ..sweep.sweep import Key, Sweep, check_point, claim_folder, forget_failures, run_sweep
+from ..sweep.sweep import Key, Sweep, check_point, claim_folder, forget_failures, number, run_sweep
 from .readings import Reading, Response
 
 OUTPUTS = 1000  # at least, where responses are peaks or means over time: they do not depend on those of the scene
@@ -94,11 +94,6 @@ def moved(point: Point, k: int, value: float) -> Point:
     return (*point[:k], value, *point[k + 1 :])
 
 
-def number(value: object) -> str:
-    """Return the value of a key as text, floats with six digits."""
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
 def in_words(keys: Iterable[Key], point: Point) -> str:
     """Return the values of the keys as text: `payload.0.mass = 0.5, …`."""
     return ", ".join(f"{'.'.join(key)} = {number(value)}" for key, value in zip(keys, point, strict=True))
@@ -149,12 +144,16 @@ def runs_of(
 
 @dataclass(frozen=True)
 class Design:
-    """One run: its point, its row in the table, and where its results are; of all `asked` is what was read of them."""
+    """One run: its row in the table, and where its results are; of all `asked` is what was read of them."""
 
-    point: Point
     row: Row
     folder: Path
     asked: set[str]
+
+    @property
+    def point(self) -> Point:
+        """Values of the keys."""
+        return self.row.values
 
     @property
     def completed(self) -> bool:
@@ -264,10 +263,8 @@ class Designs:
             lot = replace(wanted, points=tuple(new.values()), earlier=earlier, wanted=tuple(sorted(self._asked)))
             if self._runs.retry:
                 forget_failures(lot)
-            for (folder, point), row in zip(
-                new.items(), run_sweep(lot, self._runs.batch, self._runs.watcher), strict=True
-            ):
-                self._designs[folder] = Design(point, row, folder, self._asked)
+            for folder, row in zip(new, run_sweep(lot, self._runs.batch, self._runs.watcher), strict=True):
+                self._designs[folder] = Design(row, folder, self._asked)
         return [self._designs[folder] for folder in folders]
 
     def whole(self, design: Design) -> Design:

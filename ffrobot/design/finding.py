@@ -3,6 +3,7 @@
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
 from typing import ClassVar, NamedTuple
@@ -35,20 +36,29 @@ class TextTable(NamedTuple):
 
 
 class CsvFile(NamedTuple):
-    """Table of numbers for a CSV file: file name, name in messages, columns, rows."""
+    """Table of numbers for a CSV file: file name, columns, rows."""
 
     name: str
-    what: str
     columns: Sequence[str]
     rows: Iterable[Sequence[object]]
 
 
+@dataclass(frozen=True, kw_only=True)
 class Finding(ABC):
-    """Base of the results of design commands for the scene file `scene`: printing, tables, figures."""
+    """Base of the results of design commands for the scene file `scene`: printing, tables, figures.
 
-    scene: Path
+    Attributes:
+        runs: number of runs; `failures` are messages of failed ones.
+        table: the file of all runs; None if they were not kept.
+    """
+
     name: ClassVar[StudyName]
     title: ClassVar[str]
+
+    scene: Path
+    runs: int
+    failures: tuple[str, ...] = ()
+    table: Path | None = None
 
     @property
     def shortfall(self) -> str | None:
@@ -96,7 +106,8 @@ class Finding(ABC):
     def write_tables(self, folder: Path) -> Iterator[Path]:
         """Write the CSV tables; yields the written files."""
         for file in self.csv_files():
-            write_atomically(folder / file.name, as_csv([file.columns, *file.rows]).encode(), file.what, ours=True)
+            content = as_csv([file.columns, *file.rows]).encode()
+            write_atomically(folder / file.name, content, "table of the study", ours=True)
             yield folder / file.name
 
     def study(self) -> Study:

@@ -106,16 +106,13 @@ class _Functions:
 
     def excesses(self, x: Array) -> Array:
         rows = self._rows(x)
-        over = rows[self._tops] - x[-1] if self.has_level else np.zeros(0)
-        return np.concatenate([rows[self._limits], over])
+        return rows[self._tops] - x[-1] if self.has_level else rows[self._limits]
 
     def excess_gradients(self, x: Array) -> Array:
         rows = self._row_gradients(x)
         if not self.has_level:
             return rows[self._limits]
-        chosen = [*self._limits, *self._tops]
-        level = np.where(np.arange(len(chosen)) < len(self._limits), 0.0, -1.0)
-        return np.column_stack([rows[chosen], level])
+        return np.column_stack([rows[self._tops], np.full(len(self._tops), -1.0)])
 
     def _rows(self, x: Array) -> Array:
         evaluations = self._evaluations
@@ -185,6 +182,11 @@ class Local:
     optimality: Optimality | None
     message: str = ""
     spent: bool = False
+
+    @property
+    def converged(self) -> bool:
+        """Whether the conditions of optimality are satisfied."""
+        return self.optimality is not None and self.optimality.reached(AIM)
 
 
 def search_from(

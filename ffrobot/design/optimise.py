@@ -23,13 +23,14 @@ from ..common.errors import InputError, SolveError
 from ..pictures.studies.study import Diagram, Points
 from ..run.watcher import Watcher
 from ..sweep.files import run_files
-from .designs import Designs, Runs, SpentError, changes_for, may_repeat, moved, number
+from ..sweep.sweep import number
+from .designs import Designs, Runs, SpentError, changes_for, may_repeat, moved
 from .evaluations import Differentiation, Evaluated, Evaluations, write_designs
-from .finding import CsvFile, Finding, TextTable, floats, with_unit
-from .local_search import AIM, Local, best_of, combinations, evolve, rank, search_from
-from .optimum_record import Optimum, parallel
+from .finding import CsvFile, TextTable, floats, with_unit
+from .local_search import Local, best_of, combinations, evolve, rank, search_from
+from .optimum_record import Optimum, Searched, parallel
 from .readings import Reading, Response
-from .responses import KEPT, DesignProblem, Limit, parse_response, read_problem, with_motors
+from .responses import DesignProblem, Limit, parse_response, read_problem, with_motors
 from .variables import DesignSpace, Place, read_space
 
 BEST = "best"  # folder of the best design's scene
@@ -152,10 +153,7 @@ def _optimum(
         problem=problem,
         space=space,
         method=method,
-        start=best.start,
-        best=best.best,
-        optimality=best.optimality,
-        message=best.message,
+        **vars(best),
         searches=tuple(searches),
         runs=evaluations.designs.count,
         failures=tuple(evaluations.failures),
@@ -167,50 +165,37 @@ def _optimum(
     )
 
 
-@dataclass(frozen=True)
-class FrontPoint:
+@dataclass(frozen=True, kw_only=True)
+class FrontPoint(Local):
     """The best design with one limit of the second response.
 
     Attributes:
         point: values of the keys.
         response, against: of both responses there, in the `units` of the front.
         price: ∂response/∂against along the front; NaN at its ends.
-        converged: whether gradients say that nothing better is near. `feasible`: whether it keeps all limits.
-        message: why the search ended where it is not.
-        design: itself.
+        feasible: whether it keeps all limits.
     """
 
     point: tuple[object, ...]
     response: float
     against: float
     price: float
-    converged: bool
     feasible: bool
-    message: str
-    design: Evaluated
 
 
-@dataclass(frozen=True)
-class Front(Finding):
-    """A Pareto front: `points` from the least `responses[0]` to the least `responses[1]`, found with `runs` runs.
+@dataclass(frozen=True, kw_only=True)
+class Front(Searched):
+    """A Pareto front: `points` from the least `responses[0]` to the least `responses[1]`.
 
-    `tried` are the designs of all searches, each once. They have the responses of `problem`, its limits along the whole
-    curve included, and then the second response.
+    Designs have the responses of `problem`, its limits along the whole curve included, and then the second response.
     """
 
     name = "front"
     title = "Pareto front"
 
-    scene: Path
     responses: tuple[str, str]
     units: tuple[str, str]
-    keys: tuple[str, ...]
     points: tuple[FrontPoint, ...]
-    runs: int
-    tolerance: float
-    space: DesignSpace
-    problem: DesignProblem
-    tried: tuple[Evaluated, ...]
 
     @property
     def values(self) -> Array:
@@ -254,11 +239,11 @@ class Front(Finding):
             price = one.price if np.isfinite(one.price) else ""
             states = ("yes" if state else "no" for state in (one.converged, one.feasible))
             rows.append([one.response, one.against, price, *one.point, *states, one.message])
-        yield CsvFile("front.csv", "table of the front", columns, rows)
+        yield CsvFile("front.csv", columns, rows)
 
     def diagrams(self) -> list[Diagram]:
         """Diagrams of the front and of all designs."""
-        best = [one.design for one in self.points]
+        best = [one.best for one in self.points]
         response, against = self.values.T
         curve = Points(
             name="front",
@@ -310,7 +295,7 @@ class _Searches:
     def front(self, count: int) -> Front:
         assert self.space.start_place is not None  # which `check_start` has seen to
         first = self._least(self.problem, self.space.start_place, f"1 of {count}")
-        last = self._least(replace(self.problem, objective=self.against), first.design.place, f"{count} of {count}")
+        last = self._least(replace(self.problem, objective=self.against), first.best.place, f"{count} of {count}")
         high, low = first.against, last.against
         if high - low <= SAME * abs(high):
             raise InputError(
@@ -321,8 +306,8 @@ class _Searches:
         spaced = np.geomspace if low * high > 0.0 else np.linspace  # equal ratios, or steps where the signs differ
         for k, bound in enumerate(map(float, spaced(high, low, count)[1:-1]), start=2):
             limits = (Limit(self.against, 1.0, bound), *self.problem.limits)
-            points.append(self._least(replace(self.problem, limits=limits), points[-1].design.place, f"{k} of {count}"))
-        unit, other = (one.unit for one in self._both(first.design))
+            points.append(self._least(replace(self.problem, limits=limits), points[-1].best.place, f"{k} of {count}"))
+        unit, other = (one.unit for one in self._both(first.best))
         responses = (*self.problem.responses, self.against)
         tried = (
             replace(one, readings=one.design.read(responses)) if one.completed else one for one in self.tried.values()
@@ -331,7 +316,6 @@ class _Searches:
             scene=self.runner.path,
             responses=(self.problem.objective.text, self.against.text),
             units=(unit, other),
-            keys=tuple(map(".".join, self.space.keys)),
             points=(*points, last),
             runs=self.designs.count,
             tolerance=self.tolerance,
@@ -357,10 +341,8 @@ class _Searches:
             response=response,
             against=against,
             price=self._price(local, evaluations.problem),
-            converged=local.optimality is not None and local.optimality.reached(AIM),
-            feasible=evaluations.problem.violation(local.best.readings) <= KEPT,
-            message=local.message,
-            design=local.best,
+            feasible=evaluations.problem.keeps(local.best.readings),
+            **vars(local),
         )
 
     def _price(self, local: Local, problem: DesignProblem) -> float:

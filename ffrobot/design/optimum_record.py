@@ -18,8 +18,8 @@ from ..pictures.studies.study import (
     axis_of_response,
 )
 from ..results.verdict import Verdict
-from .designs import number
-from .evaluations import Evaluated, Optimality
+from ..sweep.sweep import number
+from .evaluations import Evaluated
 from .finding import CsvFile, Finding, TextTable, failed_runs, numbers, with_unit
 from .local_search import AIM, Local
 from .responses import KEPT, DesignProblem
@@ -45,7 +45,7 @@ def parallel(
             return "failed"
         if one.design.folder in chosen:
             return "best"
-        return "kept" if problem.violation(one.readings[: len(problem.responses)]) <= KEPT else "exceeded"
+        return "kept" if problem.keeps(one.readings) else "exceeded"
 
     texts, limits = [*(one.text for one in problem.responses), *more], [None, *problem.limits, *(None for _ in more)]
     points = [space.point(one.place) for one in designs]
@@ -68,8 +68,7 @@ def progress(problem: DesignProblem, designs: Sequence[Evaluated], states: tuple
     values = numbers(one.values[0] if one.completed else np.nan for one in designs)
     unit = next((one.readings[0].unit for one in designs if one.completed), "")
     kept = [
-        problem.sense * one.values[0] if one.completed and problem.violation(one.readings) <= KEPT else np.inf
-        for one in designs
+        problem.sense * one.values[0] if one.completed and problem.keeps(one.readings) else np.inf for one in designs
     ]
     return Progress(
         name="convergence",
@@ -84,8 +83,8 @@ def progress(problem: DesignProblem, designs: Sequence[Evaluated], states: tuple
 
 def _axis(variable: DesignVariable, k: int, values: Sequence[Any]) -> DesignAxis:
     if not variable.is_catalogue:
-        keys: dict[str, Any] = {"low": variable.low, "high": variable.high, "logarithmic": variable.logarithmic}
-        return DesignAxis(label=variable.name, values=tuple(map(float, values)), **keys)
+        low, high, logarithmic = variable.low, variable.high, variable.logarithmic
+        return DesignAxis(label=variable.name, values=tuple(values), low=low, high=high, logarithmic=logarithmic)
     name, column = ".".join(variable.keys[k]), list(dict.fromkeys(row[k] for row in variable.rows))
     if all(isinstance(value, int | float) and not isinstance(value, bool) for value in column):
         axis = axis_of_response(name, tuple(map(float, column)))
@@ -98,48 +97,46 @@ SHARE = 0.01  # of a limit: the change for which prices are printed
 COLUMNS = ("what", "name", "start", "best", "low", "high", "reached", "price")
 
 
-@dataclass(frozen=True)
-class Optimum(Finding):
-    """Result of an optimization.
+@dataclass(frozen=True, kw_only=True)
+class Searched(Finding):
+    """Base of what searches find.
 
     Attributes:
-        scene: its file.
         problem, space: the objective with its limits, and the parameters.
-        method, message: the optimizer; why it ended, if not at an optimum.
-        start, best: designs of the best search; `searches` are all.
-        optimality: conditions of optimality at `best`; None without gradients.
-        runs: number of runs; `failures` are messages of failed ones.
         tolerance: largest tolerance of the runs.
-        verdict: of `best`.
-        best_scene: the scene file of `best`, complete; None if it was not kept.
-        designs: the table of all designs with their responses; None likewise.
-        tried: these designs, in the order of the search.
+        tried: all designs, each once, in the order of the search.
     """
 
-    name = "optimum"
-    title = "Optimum"
-
-    scene: Path
     problem: DesignProblem
     space: DesignSpace
-    method: str
-    start: Evaluated
-    best: Evaluated
-    optimality: Optimality | None
-    message: str
-    searches: tuple[Local, ...]
-    runs: int
-    failures: tuple[str, ...]
     tolerance: float
-    verdict: Verdict
-    best_scene: Path | None
-    designs: Path | None
     tried: tuple[Evaluated, ...]
 
     @property
     def keys(self) -> tuple[str, ...]:
         """Names of the keys, with dots."""
         return tuple(map(".".join, self.space.keys))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Optimum(Searched, Local):
+    """Result of an optimization: the best of its `searches`.
+
+    Attributes:
+        method: the optimizer.
+        verdict: of the best design.
+        best_scene: its scene file, complete; None if it was not kept.
+        designs: the table of all designs with their responses; None likewise.
+    """
+
+    name = "optimum"
+    title = "Optimum"
+
+    method: str
+    searches: tuple[Local, ...]
+    verdict: Verdict
+    best_scene: Path | None
+    designs: Path | None
 
     @property
     def values(self) -> tuple[object, ...]:
@@ -164,12 +161,7 @@ class Optimum(Finding):
     @property
     def feasible(self) -> bool:
         """Whether the best design satisfies all limits."""
-        return self.violation <= KEPT
-
-    @property
-    def converged(self) -> bool:
-        """Whether the conditions of optimality are satisfied."""
-        return self.optimality is not None and self.optimality.reached(AIM)
+        return self.problem.keeps(self.best.readings)
 
     @property
     def prices(self) -> Array:
@@ -277,7 +269,7 @@ class Optimum(Finding):
         for k, (limit, price) in enumerate(zip(problem.limits, self.prices, strict=True)):
             within = ("", limit.bound) if limit.sense > 0 else (limit.bound, "")
             rows.append(["limit", limit.response.text, starts[k + 1], self.limits[k], *within, *_reached(price)])
-        yield CsvFile("optimum.csv", "table of the optimum", COLUMNS, rows)
+        yield CsvFile("optimum.csv", COLUMNS, rows)
 
     def diagrams(self) -> list[Diagram]:
         """Diagrams of all designs and of the convergence."""

@@ -13,10 +13,9 @@ import numpy as np
 
 from ..common.arrays import Array
 from ..common.errors import InputError, did_you_mean
-from ..common.meanings import meaning
 from ..common.peaks import root_mean_square, top_at
-from ..mbs.joints.joints import JOINT_TYPES
 from ..results.file import COLUMN, Results
+from ..results.joints import unit_of
 from ..results.peaks import MEAN_POWER, RMS_POWER
 from ..results.peaks import POWER as PEAK_POWER
 from ..sweep.runs import by_dots, is_vector
@@ -96,7 +95,7 @@ class Response:
         return self.read(results)
 
 
-JOINT = re.compile(r"(?P<analysis>[^/]+)/joints/(?P<joint>[^/]+)")
+JOINT = re.compile(r"[^/]+/joints/[^/]+")
 POWER = "power"
 """What joints have besides their datasets: the power of their motors, W."""
 
@@ -178,8 +177,8 @@ def read_history(results: Results, name: str, option: str) -> History:
     elif is_vector(results, dataset, values):
         values = np.linalg.norm(values, axis=1, keepdims=True)
     largest, rms, mean = (float(one.max()) for one in sizes)
-    unit = _unit(results, dataset).replace(" ", "·")
-    return History(name, unit, time, values, largest, rms, mean=mean, is_in_doubt=in_doubt)
+    unit = "W" if is_power else unit_of(results.scene, dataset.partition("/")[2]).replace(" ", "·")
+    return History(name, "" if "," in unit else unit, time, values, largest, rms, mean=mean, is_in_doubt=in_doubt)
 
 
 def read_column(results: Results, name: str, option: str) -> History:
@@ -208,22 +207,6 @@ def _power(results: Results, name: str) -> Array:
     rate = "motor_rate" if f"{joint}/motor_rate" in results else "rate"
     power = results.data(f"{joint}/moment") * results.data(f"{joint}/{rate}")
     return power.sum(axis=1, keepdims=True)
-
-
-def _unit(results: Results, name: str) -> str:
-    """Where the dataset has one only; of a joint that of its coordinates, where these are all angles or all ways."""
-    if name.endswith(f"/{POWER}"):
-        return "W"
-    known = meaning(name.partition("/")[2])
-    if known is None or "," not in known.unit:
-        return known.unit if known is not None else ""
-    match = JOINT.match(name)
-    kinds = {str(joint["name"]): str(joint["type"]) for joint in results.scene["joint"]} if match else {}
-    if match is None or match["joint"] not in kinds:
-        return ""
-    units = set(JOINT_TYPES[kinds[match["joint"]]].units)  # types that the plane has too have the same there
-    turning, sliding = known.unit.split(", ")
-    return {"rad": turning, "m": sliding}[units.pop()] if len(units) == 1 else ""
 
 
 COARSE = 2  # every second output: what a peak is with these tells how well all of them resolve it

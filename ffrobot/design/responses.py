@@ -1,9 +1,10 @@
 """Scalars that a design is judged by, with limits: what `--of`, `--minimise` and `--subject-to` may say."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from ..common.tables import shown
 from ..fe_models.modal_body import ModalBody
 from ..present.feasibility import joint_tasks
 from ..results.file import Results
-from ..sweep.files import value_of
+from ..sweep.files import number_of, value_of
 from .readings import MISSED, POWER, UNCERTAIN, History, Peak, Reading, Response, read_column
 from .variables import DesignSpace, DesignVariable
 
@@ -27,8 +28,8 @@ class OfMotors(Response):
     The share is that of rated torque (by the RMS), of peak torque, or of speed.
     """
 
-    text: str
     what: str
+    text: str
     chosen: tuple[DesignVariable, ...] = ()
 
     def read(self, results: Results) -> Reading:
@@ -55,13 +56,6 @@ class OfMotors(Response):
         return max(shares)
 
 
-FORMS = (
-    "peak HISTORY", "rms HISTORY", "mean HISTORY", "integral HISTORY", "at TIME HISTORY", "energy joints.NAME",
-    "residual POINT", "settling POINT", "frequency NUMBER BODY", "mass", "mass BODY", "motors mass", "motors cost",
-    "motors share", "value KEY",
-)  # fmt: skip
-
-
 ROUND_OFF = 1e-9  # of a history: by so much means of nothing may differ
 
 
@@ -69,8 +63,8 @@ ROUND_OFF = 1e-9  # of a history: by so much means of nothing may differ
 class OfHistory(Response):
     """The "rms", "mean" or "integral" of a history of one column, or its value "at" t, s."""
 
-    text: str
     word: str
+    text: str
     name: str
     t: float = np.nan
 
@@ -106,8 +100,8 @@ class OfHistory(Response):
 class OfSettling(Response):
     """Residual vibration of a point, m, or the time in which it settles, s; see `mbs.quantities.settling`."""
 
-    text: str
     what: str
+    text: str
     point: str
     is_of_rest = True
 
@@ -191,37 +185,32 @@ class OfValue(Response):
 
     def read(self, results: Results) -> Reading:
         """Return the number in the scene of the results."""
-        parts = tuple(self.key.split("."))
-        value = value_of(results.scene, parts, option=f'"{self.text}"')
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            what = "none" if value is None else repr(value)
-            raise InputError(f'"{self.text}": expected a number of the scene file at {self.key}', what)
-        return Reading(float(value))
+        return Reading(number_of(results.scene, tuple(self.key.split(".")), f'"{self.text}"'))
+
+
+FORMS: dict[str, Callable[..., Response]] = {
+    "peak HISTORY": Peak,
+    **{f"{word} HISTORY": partial(OfHistory, word) for word in ("rms", "mean", "integral")},
+    "at TIME HISTORY": lambda text, time, name: OfHistory("at", text, name, float(time)),
+    "energy joints.NAME": lambda text, joint: OfHistory("integral", text, f"{joint}.{POWER}"),
+    **{f"{what} POINT": partial(OfSettling, what) for what in ("residual", "settling")},
+    "frequency NUMBER BODY": lambda text, number, body: OfFrequency(text, int(number), body),
+    "mass": OfMass,
+    "mass BODY": OfMass,
+    **{f"motors {what}": partial(OfMotors, what) for what in ("mass", "cost", "share")},
+    "value KEY": OfValue,
+}
+"""What makes responses of their text and its words in place of capitals."""
 
 
 def parse_response(text: str, option: str = "--of") -> Response:
     """Return the response that `text`, one of `FORMS`, names. Raises `InputError` if it is none of them."""
-    word, *rest = text.split() or [""]
-    with suppress(ValueError):
-        match word, rest:
-            case "peak", [name]:
-                return Peak(text, name)
-            case "at", [time, name]:
-                return OfHistory(text, word, name, float(time))
-            case "energy", [joint]:
-                return OfHistory(text, "integral", f"{joint}.{POWER}")
-            case (("rms" | "mean" | "integral"), [name]):
-                return OfHistory(text, word, name)
-            case (("residual" | "settling"), [point]):
-                return OfSettling(text, word, point)
-            case "frequency", [number, body] if number.isdecimal():
-                return OfFrequency(text, int(number), body)
-            case "mass", [] | [_]:
-                return OfMass(text, *rest)
-            case "motors", [("mass" | "cost" | "share") as what]:
-                return OfMotors(text, what)
-            case "value", [key] if all(key.split(".")):
-                return OfValue(text, key)
+    words = text.split()
+    for form, make in FORMS.items():
+        pairs = list(zip(form.split(), words, strict=False))
+        if len(words) == len(form.split()) and all(part == word or not part.islower() for part, word in pairs):
+            with suppress(ValueError):
+                return make(text, *(word for part, word in pairs if not part.islower()))
     raise InputError(f"{option}: expected {either(FORMS)}", f'"{text}"')
 
 
@@ -295,9 +284,13 @@ class DesignProblem:
         place = np.where(of_zero, 1.0, np.maximum(ratios, LINEAR))
         return senses * (np.log(place) + (ratios - place) / place), senses / place / sizes
 
+    def keeps(self, readings: Sequence[Reading]) -> bool:
+        """Return whether all limits are kept; more readings than those of the problem may follow."""
+        return self.violation(readings) <= KEPT
+
     def violation(self, readings: Sequence[Reading]) -> float:
         """Return the largest excess, relative to its limit; 0 if none is exceeded."""
-        excesses = (limit.excess(one.value) for limit, one in zip(self.limits, readings[1:], strict=True))
+        excesses = (limit.excess(one.value) for limit, one in zip(self.limits, readings[1:], strict=False))
         return max((0.0, *excesses))
 
 
@@ -319,7 +312,7 @@ def with_motors(problem: DesignProblem, space: DesignSpace) -> DesignProblem:
 
     limits = tuple(replace(limit, response=bound(limit.response)) for limit in problem.limits)
     if chosen and not any(isinstance(limit.response, OfMotors) and limit.response.what == "share" for limit in limits):
-        limits += (Limit(OfMotors("motors share", "share", chosen), 1.0, 1.0),)
+        limits += (Limit(OfMotors("share", "motors share", chosen), 1.0, 1.0),)
     return replace(problem, objective=bound(problem.objective), limits=limits)
 
 

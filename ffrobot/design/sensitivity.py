@@ -13,7 +13,6 @@ steps of a quarter follow, twice at most.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -40,38 +39,30 @@ HOW = {
 ERRORS = "errors: by differences of lower order, noise, and the tolerance of reused time steps"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Sensitivity(Finding):
     """Derivatives of g responses with respect to k keys.
 
     Attributes:
-        scene: its file.
-        responses, readings: the responses, and their values in the scene.
+        readings: of the responses in the scene.
         keys: with dots; `values` (k,) are theirs in the scene.
         entries: the derivatives, [response][key].
-        failures: messages of failed designs.
-        tolerance: largest tolerance of the runs; `runs` is their number.
-        table: the file of all runs; None if they were not kept.
+        tolerance: largest tolerance of the runs.
     """
 
     name = "sensitivity"
     title = "Sensitivities"
 
-    scene: Path
-    responses: tuple[str, ...]
-    readings: tuple[Reading, ...]
+    readings: dict[str, Reading]
     keys: tuple[str, ...]
     values: Array
     entries: tuple[tuple[Entry, ...], ...]
-    failures: tuple[str, ...]
     tolerance: float
-    runs: int
-    table: Path | None
 
     @property
     def value(self) -> Array:
         """Responses (g,) of the scene, SI units."""
-        return np.array([reading.value for reading in self.readings])
+        return np.array([reading.value for reading in self.readings.values()])
 
     @property
     def derivative(self) -> Array:
@@ -98,12 +89,12 @@ class Sensitivity(Finding):
     def headline(self) -> str:
         """The key with the largest influence on each response."""
         return "; ".join(
-            f"{response}: {self.keys[self.ranked(g)[0]]} matters most" for g, response in enumerate(self.responses)
+            f"{response}: {self.keys[self.ranked(g)[0]]} matters most" for g, response in enumerate(self.readings)
         )
 
     def sections(self) -> Iterator[TextTable]:
         """Tables, one for each response, the most influential key first."""
-        for g, (response, reading) in enumerate(zip(self.responses, self.readings, strict=True)):
+        for g, (response, reading) in enumerate(self.readings.items()):
             rows = []
             for k in self.ranked(g):
                 one = self.entries[g][k]
@@ -116,12 +107,12 @@ class Sensitivity(Finding):
     def csv_files(self) -> Iterator[CsvFile]:
         """CSV tables with one line for each response and key."""
         rows: list[list[object]] = []
-        for g, (response, reading) in enumerate(zip(self.responses, self.readings, strict=True)):
+        for g, (response, reading) in enumerate(self.readings.items()):
             about = [response, reading.value, reading.unit, "" if np.isnan(reading.time) else reading.time]
             for k, one in enumerate(self.entries[g]):
                 values = [float(self.values[k]), one.derivative, one.error, self.logarithmic[g, k]]
                 rows.append([*about, self.keys[k], *values, one.method, one.step, "; ".join(one.notes)])
-        yield CsvFile("sensitivity.csv", "table of sensitivities", COLUMNS, rows)
+        yield CsvFile("sensitivity.csv", COLUMNS, rows)
 
     def diagrams(self) -> list[Bars]:
         """Tornado diagrams, one for each response: percent per percent of each key, the largest on top.
@@ -129,12 +120,12 @@ class Sensitivity(Finding):
         Keys without a number are left out.
         """
         bars = []
-        for g, response in enumerate(self.responses):
+        for g, (response, reading) in enumerate(self.readings.items()):
             known = [k for k in self.ranked(g) if np.isfinite(self.logarithmic[g, k])]
             bars.append(
                 Bars(
                     name=f"tornado_{file_name(response)}",
-                    title=f"{response}: {self.readings[g].in_words(5)}",
+                    title=f"{response}: {reading.in_words(5)}",
                     x_label="% per % of the parameter",
                     labels=tuple(self.keys[k] for k in known),
                     series=(Series(values=numbers(self.logarithmic[g, known])),),
@@ -145,7 +136,7 @@ class Sensitivity(Finding):
 
     def remarks(self) -> Iterator[str]:
         """Notes on the accuracy, failed runs, and the method."""
-        for response, reading, row in zip(self.responses, self.readings, self.entries, strict=True):
+        for (response, reading), row in zip(self.readings.items(), self.entries, strict=True):
             if reading.remark:
                 yield f"note       {response}: {reading.remark}"
             for key, one in zip(self.keys, row, strict=True):
@@ -190,8 +181,7 @@ def find_sensitivity(
     )
     return Sensitivity(
         scene=runs.path,
-        responses=tuple(response.text for response in responses),
-        readings=base.readings,
+        readings={response.text: one for response, one in zip(responses, base.readings, strict=True)},
         keys=tuple(map(".".join, keys)),
         values=np.array(base.point),
         entries=entries(base, samples),

@@ -6,8 +6,6 @@ Errors are those of independent samples. The mean of a Latin hypercube, whose sa
 is better the nearer its quantity is to a sum of functions of one key each (Stein, Technometrics 29, 1987).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from contextlib import suppress
@@ -113,6 +111,11 @@ class Indices:
     total: Array
     total_error: Array
 
+    @property
+    def named(self) -> dict[str, tuple[Array, Array]]:
+        """Indices and their errors by what keys do alone, and with others."""
+        return {"alone": (self.first, self.first_error), "with others": (self.total, self.total_error)}
+
 
 def sobol_indices(a: Array, b: Array, ab: Array, seed: int = 0) -> Indices:
     """Return Sobol indices from responses at points A (n, g), B (n, g), and A with column i of B (k, n, g).
@@ -215,53 +218,30 @@ def _size(text: str, own: float, whole: str) -> float:
 DRAWS = 4096  # of the model, for quantiles: no runs
 
 
-@dataclass(frozen=True)
-class LinearSpread:
-    """f = f₀ + Σ d_k δ_k + ½ Σ c_k δ_k² with δ_k in standard deviations of key k.
+def linear_statistics(spreads: Sequence[Spread], middle: Array, sides: Array) -> tuple[SpreadStatistics, Array]:
+    """Return statistics of f = f₀ + Σ d_k δ_k with δ_k in standard deviations of key k, and shares (…, k) of the keys.
 
-    `middle` (…), `slopes` (k, …) and `curvatures` (k, …); the last are for errors alone.
+    By values `middle` (…) and `sides` (k, 2, …), one standard deviation above and below it. Errors are what curvatures,
+    ½ Σ c_k δ_k², would change. The worst case has every key at the end of its spread that makes it worst, a normal one
+    two deviations off. Shares are those of the variance.
     """
-
-    spreads: tuple[Spread, ...]
-    middle: Array
-    slopes: Array
-    curvatures: Array
-
-    @staticmethod
-    def through(spreads: Sequence[Spread], middle: Array, sides: Array) -> LinearSpread:
-        """Fit the model to values `middle` (…) and `sides` (k, 2, …), one standard deviation above and below it."""
-        above, below = sides[:, 0], sides[:, 1]
-        return LinearSpread(tuple(spreads), middle, 0.5 * (above - below), above - 2.0 * middle + below)
-
-    @property
-    def shares(self) -> Array:
-        """Shares (…, k) of the variance by key."""
-        squares = self.slopes**2
-        whole = squares.sum(axis=0)
-        return np.divide(squares, whole, out=np.zeros_like(squares), where=whole > 0.0).T
-
-    def statistics(self) -> SpreadStatistics:
-        """Return statistics of the linear part; curvatures give the errors.
-
-        The worst case has every key at the end of its spread that makes it worst, a normal one two deviations off.
-        """
-        u = scipy.stats.qmc.LatinHypercube(len(self.spreads), seed=0).random(DRAWS)
-        delta = np.column_stack(
-            [(one.values(u[:, k]) - one.mean) / one.deviation for k, one in enumerate(self.spreads)]
-        )
-        linear = self.middle + np.tensordot(delta, self.slopes, 1)
-        bent = linear + 0.5 * np.tensordot(delta**2, self.curvatures, 1)
-        quantiles = np.quantile(linear, LEVELS, axis=0)
-        deviation = np.sqrt((self.slopes**2).sum(axis=0))
-        ends = np.array([(one.ends[1] - one.mean) / one.deviation for one in self.spreads])
-        reach = np.tensordot(ends, np.abs(self.slopes), 1)
-        return SpreadStatistics(
-            mean=self.middle,
-            mean_error=np.abs(bent.mean(axis=0) - linear.mean(axis=0)),
-            deviation=deviation,
-            deviation_error=np.abs(bent.std(axis=0) - linear.std(axis=0)),
-            quantiles=quantiles,
-            quantile_errors=np.abs(np.quantile(bent, LEVELS, axis=0) - quantiles),
-            lowest=self.middle - reach,
-            highest=self.middle + reach,
-        )
+    above, below = sides[:, 0], sides[:, 1]
+    slopes, curvatures = 0.5 * (above - below), above - 2.0 * middle + below
+    u = scipy.stats.qmc.LatinHypercube(len(spreads), seed=0).random(DRAWS)
+    delta = np.column_stack([(one.values(u[:, k]) - one.mean) / one.deviation for k, one in enumerate(spreads)])
+    linear = middle + np.tensordot(delta, slopes, 1)
+    bent = linear + 0.5 * np.tensordot(delta**2, curvatures, 1)
+    quantiles, squares = np.quantile(linear, LEVELS, axis=0), slopes**2
+    variance = squares.sum(axis=0)
+    reach = np.tensordot([(one.ends[1] - one.mean) / one.deviation for one in spreads], np.abs(slopes), 1)
+    found = SpreadStatistics(
+        mean=middle,
+        mean_error=np.abs(bent.mean(axis=0) - linear.mean(axis=0)),
+        deviation=np.sqrt(variance),
+        deviation_error=np.abs(bent.std(axis=0) - linear.std(axis=0)),
+        quantiles=quantiles,
+        quantile_errors=np.abs(np.quantile(bent, LEVELS, axis=0) - quantiles),
+        lowest=middle - reach,
+        highest=middle + reach,
+    )
+    return found, np.divide(squares, variance, out=np.zeros_like(squares), where=variance > 0.0).T

@@ -18,9 +18,9 @@ from .designs import Design, Designs, Point, Runs, changes_for, in_words, moved
 from .readings import Peak, Response, read_column
 from .responses import parse_response
 from .spreads import (
-    LinearSpread,
     Spread,
     SpreadStatistics,
+    linear_statistics,
     parse_spread,
     regression_shares,
     sobol_indices,
@@ -127,15 +127,15 @@ class _Study:
             )
         pairs = np.array([self._follow(design) for design in designs])
 
-        def linear(nominal: Array, of_designs: Array) -> LinearSpread:
-            return LinearSpread.through(self._spreads, nominal, of_designs.reshape(len(self._spreads), 2, -1))
+        def linear(nominal: Array, of_designs: Array) -> tuple[SpreadStatistics, Array]:
+            return linear_statistics(self._spreads, nominal, of_designs.reshape(len(self._spreads), 2, -1))
 
-        model = linear(np.array([one.value for one in self._readings]), pairs)
+        of_responses, shares = linear(np.array([one.value for one in self._readings]), pairs)
         return Uncertainty(
             method="gradients",
-            statistics=model.statistics(),
-            bands=self._bands(designs, lambda nominal, of_designs: linear(nominal, of_designs).statistics()),
-            shares=model.shares,
+            statistics=of_responses,
+            bands=self._bands(designs, lambda nominal, of_designs: linear(nominal, of_designs)[0]),
+            shares=shares,
             explained=np.full(len(self._responses), np.nan),
             indices=None,
             samples=np.zeros((0, len(self._responses))),
@@ -147,8 +147,7 @@ class _Study:
         return {
             "scene": self._path,
             "spreads": self._spreads,
-            "responses": tuple(response.text for response in self._responses),
-            "readings": self._readings,
+            "readings": {of.text: one for of, one in zip(self._responses, self._readings, strict=True)},
             "failures": tuple(self._failures),
             "notes": tuple(self._notes.values()),
             "table": self._designs.table,

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -32,47 +31,40 @@ class HistoryBand:
     statistics: SpreadStatistics
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Uncertainty(Finding):
     """Statistics of g responses and some histories for k uncertain keys.
 
     Attributes:
-        scene: its file.
         spreads: (k,) distributions of the keys.
         method: samples or gradients.
-        responses, readings: (g,) the responses, and their values with all keys at nominal values.
+        readings: of the responses with all keys at nominal values.
         statistics: (g,) of the responses.
         bands: of the histories.
         shares: (g, k) shares of the variance by the linear part; `explained` (g,) is their sum, NaN by gradients.
         indices: Sobol indices, if requested.
         samples: (n, g) the responses, NaN for failed runs; (0, g) by gradients.
-        failures: failed runs in words; `runs` is the number of all, `table` their file.
         notes: peaks between outputs; peaks that others exceed near the nominal values (by gradients).
     """
 
     name = "uncertainty"
     title = "Uncertainty"
 
-    scene: Path
     spreads: tuple[Spread, ...]
     method: LinearOrSampled
-    responses: tuple[str, ...]
-    readings: tuple[Reading, ...]
+    readings: dict[str, Reading]
     statistics: SpreadStatistics
     bands: tuple[HistoryBand, ...]
     shares: Array
     explained: Array
     indices: Indices | None
     samples: Array
-    failures: tuple[str, ...]
     notes: tuple[str, ...]
-    runs: int
-    table: Path | None
 
     def headline(self) -> str:
         """Intervals of the responses, in one line."""
         texts = []
-        for g, (response, reading) in enumerate(zip(self.responses, self.readings, strict=True)):
+        for g, (response, reading) in enumerate(self.readings.items()):
             low, _, high = self.statistics.quantiles[:, g]
             texts.append(
                 f"{response}: {low:.5g} to {high:.5g} {reading.unit}".rstrip() + f" ({NAMES[0]} to {NAMES[-1]})"
@@ -81,7 +73,7 @@ class Uncertainty(Finding):
 
     def sections(self) -> Iterator[TextTable]:
         """Tables of each response with the influence of the keys, then the bands."""
-        for g, (response, reading) in enumerate(zip(self.responses, self.readings, strict=True)):
+        for g, (response, reading) in enumerate(self.readings.items()):
             heading = (*self.statistics.named, "worst case")
             nominal = f"{response}: {reading.in_words()} with all parameters at nominal values"
             yield TextTable(heading, [self._statistics_row(g)], line=nominal)
@@ -90,14 +82,14 @@ class Uncertainty(Finding):
 
     def report_tables(self) -> Iterator[StudyTable]:
         """The statistics of all responses in one table."""
-        if self.responses:
+        if self.readings:
             rows = [
                 (response, reading.unit, f"{reading.value:.6g}", *self._statistics_row(g))
-                for g, (response, reading) in enumerate(zip(self.responses, self.readings, strict=True))
+                for g, (response, reading) in enumerate(self.readings.items())
             ]
             heading = ("response", "unit", "nominal", *self.statistics.named, "worst case")
             yield TextTable(heading, rows).for_report()
-        yield from (table.for_report() for table in (*map(self._parts, range(len(self.responses))), *self._bands()))
+        yield from (table.for_report() for table in (*map(self._parts, range(len(self.readings))), *self._bands()))
 
     def _statistics_row(self, g: int) -> tuple[str, ...]:
         s = self.statistics
@@ -110,12 +102,12 @@ class Uncertainty(Finding):
         for k in self.ranked(g):
             one = self.spreads[k]
             cells = [f"{100.0 * self.shares[g, k]:.1f} %"]
-            if i := self.indices:
-                pairs = ((i.first, i.first_error), (i.total, i.total_error))
+            if self.indices:
+                pairs = self.indices.named.values()
                 cells = [f"{with_error(100.0 * part[g, k], 100.0 * error[g, k])} %" for part, error in pairs]
             rows.append((".".join(one.key), one.text.partition("=")[2], *cells))
-        parts = ("alone", "with others") if self.indices else ("share of the variance",)
-        return TextTable(("key", "spread", *parts), rows, of=self.responses[g])
+        parts = self.indices.named if self.indices else ("share of the variance",)
+        return TextTable(("key", "spread", *parts), rows, of=[*self.readings][g])
 
     def ranked(self, g: int) -> list[int]:
         """Key numbers by decreasing influence on response g."""
@@ -136,15 +128,12 @@ class Uncertainty(Finding):
 
     def remarks(self) -> Iterator[str]:
         """Notes on the accuracy, failed runs, and the method."""
-        deviations = self.statistics.deviation
-        for response, reading, explained, deviation in zip(
-            self.responses, self.readings, self.explained, deviations, strict=True
-        ):
-            if deviation <= ROUND_OFF * abs(reading.value):
+        for g, (response, reading) in enumerate(self.readings.items()):
+            if self.statistics.deviation[g] <= ROUND_OFF * abs(reading.value):
                 yield f"note       {response}: {UNCHANGED}"
-            if explained < LINEAR and self.indices is None:
+            if (linear := self.explained[g]) < LINEAR and self.indices is None:
                 yield (
-                    f"note       {response}: linear effects of keys make up {100 * explained:.0f} % of the variance:"
+                    f"note       {response}: linear effects of keys make up {100 * linear:.0f} % of the variance:"
                     " --indices computes the effect of each, alone and with others"
                 )
         yield from (f"note       {text}" for text in self.notes)
@@ -162,36 +151,33 @@ class Uncertainty(Finding):
 
     def csv_files(self) -> Iterator[CsvFile]:
         """CSV tables with one line for each response, and for each time of a history."""
-        if self.responses:
-            keys, i = [".".join(one.key) for one in self.spreads], self.indices
-            parts = {"share": self.shares}
-            if i:
-                parts |= {"first": i.first, "first_error": i.first_error}
-                parts |= {"total": i.total, "total_error": i.total_error}
+        if self.readings:
+            keys, parts = [".".join(one.key) for one in self.spreads], {"share": self.shares}
+            if self.indices:
+                parts |= vars(self.indices)
             of_keys = [f"{word} {key}" for word in parts for key in keys]
             columns = ["response", "unit", "middle", *self.statistics.columns, "linear", *of_keys]
             rows = [
                 [response, reading.unit, reading.value, *self.statistics.numbers(g), self.explained[g],
                  *(value for part in parts.values() for value in part[g])]
-                for g, (response, reading) in enumerate(zip(self.responses, self.readings, strict=True))
+                for g, (response, reading) in enumerate(self.readings.items())
             ]  # fmt: skip
-            yield CsvFile("uncertainty.csv", "table of uncertainties", columns, rows)
+            yield CsvFile("uncertainty.csv", columns, rows)
         for band in self.bands:
             lines = ([t, band.nominal[k], *band.statistics.numbers(k)] for k, t in enumerate(band.time))
             of_times = ["time", "nominal", *band.statistics.columns]
-            yield CsvFile(f"band_{file_name(band.name)}.csv", "table of uncertainties", of_times, lines)
+            yield CsvFile(f"band_{file_name(band.name)}.csv", of_times, lines)
 
     def diagrams(self) -> list[Diagram]:
         """Diagrams of the ranking of keys for each response, and of the bands."""
         pictures: list[Diagram] = []
-        for g, response in enumerate(self.responses):
+        for g, response in enumerate(self.readings):
             order = self.ranked(g)
             series = [Series(values=numbers(100.0 * self.shares[g, order]))]
-            if i := self.indices:
-                pairs = {"alone": (i.first, i.first_error), "with others": (i.total, i.total_error)}
+            if self.indices:
                 series = [
                     Series(label=label, values=numbers(100.0 * value[g, order]), errors=floats(100.0 * error[g, order]))
-                    for label, (value, error) in pairs.items()
+                    for label, (value, error) in self.indices.named.items()
                 ]
             bars = Bars(
                 name=f"ranking_{file_name(response)}",

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..common.arrays import Array
+from ..common.meanings import meaning
 from ..mbs.joints.joint import JointRecord, MotorLimits
 from ..mbs.joints.joints import JOINT_TYPES
 
@@ -56,3 +57,13 @@ def labelled_coordinates(scene: Scene) -> Coordinates:
 def joint_coordinates(scene: Scene, name: str) -> tuple[Coordinate, ...]:
     """The coordinates of a joint in the order of its datasets; none of one that does not move, or is not there."""
     return tuple(one for one in labelled_coordinates(scene).values() if one.joint == name)
+
+
+def unit_of(scene: Scene, name: str) -> str:
+    """Return the unit of a dataset of an analysis, "" without one; of a joint's that of its coordinates."""
+    known, parts = meaning(name), name.split("/")
+    units = known.unit.split(", ") if known is not None else []
+    if parts[0] == "joints" and len(units) == 2:  # of angles, of displacements
+        kinds = {one.unit for one in joint_coordinates(scene, parts[1])}
+        units = [unit for unit, kind in zip(units, ("rad", "m"), strict=True) if kind in kinds]
+    return ", ".join(units)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from xarray import Dataset
 
 from ..common.meanings import LABELS, meaning
-from .joints import joint_coordinates
+from .joints import unit_of
 
 if TYPE_CHECKING:
     from .file import Results
@@ -36,7 +36,9 @@ def labelled(results: Results, analysis: str, histories: Sequence[str]) -> Datas
             dimensions.append(dimension)
         else:
             dimensions += [f"{name} {k}" for k in range(1, values.ndim)]
-        variables[name] = (dimensions, values, _about(results, name))
+        known = meaning(name)
+        of_name = {} if known is None else {"units": unit_of(results.scene, name), "long_name": known.what}
+        variables[name] = (dimensions, values, of_name)
     for name in (TIME, SAMPLES) if is_sampled else (TIME,):
         coordinates[name] = (name, results[f"{analysis}/{name}"], {"units": "s"})
     about = {key: value for key, value in results.attributes(analysis).items() if not isinstance(value, bytes)}
@@ -51,15 +53,3 @@ def _columns(results: Results, analysis: str, name: str, count: int) -> tuple[st
     if name.startswith("trajectories/"):
         labels = [str(one) for one in results.attributes(f"{analysis}/trajectories/{part}")["components"]]
     return dimension, labels if len(labels) == count else list(range(1, count + 1))
-
-
-def _about(results: Results, name: str) -> dict[str, str]:
-    """Unit and meaning; of a joint's datasets those of its kind of coordinate."""
-    known = meaning(name)
-    if known is None:
-        return {}
-    units, parts = known.unit.split(", "), name.split("/")
-    if parts[0] == "joints" and len(units) == 2:  # of angles, of displacements
-        kinds = {one.unit for one in joint_coordinates(results.scene, parts[1])}
-        units = [unit for unit, kind in zip(units, ("rad", "m"), strict=True) if kind in kinds]
-    return {"units": ", ".join(units), "long_name": known.what}

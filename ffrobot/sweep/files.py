@@ -125,14 +125,10 @@ def run_files(scene_path: Path, changes: Mapping[tuple[str, ...], Value], folder
 
     Raises `InputError` for a key that leads nowhere.
     """
-    scene = load_toml(scene_path, "scene file")
-    _resolve(scene, scene_path.absolute().parent)
-    links: dict[str, Table] = {}
+    scene, links = _read(scene_path, "scene file"), dict[str, Table]()
     for key, value in changes.items():
-        if key[0] == LINKS:
-            set_key(_link_of(scene_path, scene, key, links), key[2:], value, key)
-        else:
-            set_key(scene, key, deepcopy(value), key)  # of which later keys may change a part
+        tables, inner = _place(scene_path, scene, key, links)
+        set_key(tables, inner, deepcopy(value), key)  # of which later keys may change a part
     inputs = fingerprints(scene, scene_path.absolute())
     copies = {}
     for body, link in links.items():
@@ -149,27 +145,31 @@ def value_at(scene_path: Path, key: tuple[str, ...], option: str) -> Value:
 
     Raises `InputError`, with the `option` of the command that names the key, where that leads nowhere.
     """
-    return value_of(*_place(scene_path, key, option), key, option)
+    return value_of(*_place(scene_path, _read(scene_path, "scene file"), key, {}, option), key, option)
 
 
-def number_at(scene_path: Path, key: tuple[str, ...], option: str) -> float:
+def number_at(path: Path, key: tuple[str, ...], option: str, kind: str = "scene file") -> float:
     """Return the number at `key`; see `value_at`. Raises `InputError` without one."""
-    tables, inner = _place(scene_path, key, option)
-    value = value_of(tables, inner, key, option)
+    return number_of(*_place(path, _read(path, kind), key, {}, option), f"{path}: {option}", key)
+
+
+def number_of(tables: Table, key: tuple[str, ...], label: str, whole: tuple[str, ...] = ()) -> float:
+    """Return the number at `key` of `tables`; see `set_key`. Raises `InputError`, with `label` first, without one."""
+    value = value_of(tables, key, whole, label)
     if isinstance(value, bool) or not isinstance(value, int | float):
         text = "none" if value is None else repr(value)
         raise InputError(
-            f"{scene_path}: {option}: expected a number at {'.'.join(key)}, found {text}{_near(tables, inner)}"
+            f"{label}: expected a number at {'.'.join(whole or key)}, found {text}{_near(tables, key)}"
             + (", and no default counts: write its value into the file" if value is None else "")
         )
     return float(value)
 
 
-def _place(scene_path: Path, key: tuple[str, ...], option: str) -> tuple[Table, tuple[str, ...]]:
-    """The tables that `key` is in, those of the scene or of a link file, and the key there."""
-    scene = load_toml(scene_path, "scene file")
-    _resolve(scene, scene_path.absolute().parent)
-    return (_link_of(scene_path, scene, key, {}, option), key[2:]) if key[0] == LINKS else (scene, key)
+def _read(path: Path, kind: str) -> Table:
+    """The tables of a file, with names of files made absolute."""
+    tables = load_toml(path, kind)
+    _resolve(tables, path.absolute().parent)
+    return tables
 
 
 def _near(data: Node, key: tuple[str, ...]) -> str:
@@ -183,10 +183,12 @@ def _near(data: Node, key: tuple[str, ...]) -> str:
     return ""
 
 
-def _link_of(
+def _place(
     scene_path: Path, scene: Table, key: tuple[str, ...], links: dict[str, Table], option: str = "--vary"
-) -> Table:
-    """The content of the link file that `links.BODY.…` means, read once, or the table in the scene itself."""
+) -> tuple[Table, tuple[str, ...]]:
+    """The tables that `key` is in, and the key there: of `links.BODY.…` those of a link file, read once to `links`."""
+    if key[0] != LINKS:
+        return scene, key
     with_links = [name for name, body in reversed(_bodies(scene).items()) if "link" in body]
     if len(key) < 3 or key[1] not in with_links:
         dotted = ".".join(key)
@@ -201,11 +203,9 @@ def _link_of(
             raise InputError(f'{scene_path}: body "{shown(key[1])}": name: {error}') from None
         link = _body(scene, key[1])["link"]
         if isinstance(link, dict):
-            return link
-        path = Path(str(link))
-        links[key[1]] = load_toml(path, "link file")
-        _resolve(links[key[1]], path.parent)
-    return links[key[1]]
+            return link, key[2:]
+        links[key[1]] = _read(Path(str(link)), "link file")
+    return links[key[1]], key[2:]
 
 
 def _body(scene: Table, name: str) -> Table:

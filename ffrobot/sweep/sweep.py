@@ -12,7 +12,6 @@ from tempfile import TemporaryDirectory
 from time import monotonic
 
 from rich.console import Console
-from rich.table import Table
 
 from ..batch.batch import Batch
 from ..common.errors import InputError, StoppedError
@@ -22,6 +21,7 @@ from ..common.libraries import scipy
 from ..common.python_files import allowed_python, python_allowed
 from ..common.tables import as_csv
 from ..common.version import digest_of_content
+from ..present.lines import plain_table
 from ..run.inputs import PROGRAM
 from ..run.watcher import Watcher
 from .files import SCENE, RunFiles, Value, Variation, parse_variation, run_files
@@ -261,19 +261,22 @@ def print_table(sweep: Sweep, rows: Sequence[Row], console: Console) -> None:
     own = ["run", *sweep.keys, "status"]
     while len(shown) > 1 and sum(_width(header) + GAP for header in (*own, *shown)) > console.width:
         shown = shown[:-1]
-    table = Table(box=None, padding=(0, GAP, 0, 0), pad_edge=False)
-    for header in (*own, *shown):
-        table.add_column(_broken(header), justify="left" if header == "status" else "right", min_width=_width(header))
-    for row in rows:
-        values = [f"{value:.6g}" if isinstance(value, float) else str(value) for value in row.values]
-        cells = [f"{row.quantities[name]:.4g}" if name in row.quantities else "" for name in shown]
-        table.add_row(str(row.number), *values, row.status, *cells)
-    console.print(table)
+    cells = (
+        (str(row.number), *map(number, row.values), row.status,
+         *(f"{row.quantities[name]:.4g}" if name in row.quantities else "" for name in shown))
+        for row in rows
+    )  # fmt: skip
+    console.print(plain_table(map(_broken, (*own, *shown)), cells, names=1))
     for row in rows:
         if row.status != "completed":
             console.out(f"run {row.number}: {row.status}: {row.message}")
     more = f", with {len(quantities) - len(shown)} more quantities" if len(quantities) > len(shown) else ""
     console.out(f"table      {sweep.table}{more}")
+
+
+def number(value: object) -> str:
+    """Return the value of a key as text, floats with six digits."""
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _broken(header: str) -> str:

@@ -275,4 +275,4 @@ def test_patches_by_least_voltage(scene):
     path = scene(('kind = "tracking"', 'kind = "tracking"\nobjective = "least-voltage"'), alone=True)
     found = ffrobot.sensitivity(path, ["peak pzt.arm.required_voltage"], ["pzt.0.width"])
     ((entry,),) = found.entries
-    assert entry.derivative == pytest.approx(-found.readings[0].value / 0.02, rel=1e-3)
+    assert entry.derivative == pytest.approx(-next(iter(found.readings.values())).value / 0.02, rel=1e-3)
