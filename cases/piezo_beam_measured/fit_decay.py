@@ -16,7 +16,7 @@ from compare import HERE, record
 from rich.console import Console
 
 import ffrobot
-from ffrobot.fit.frf import print_responses
+from ffrobot.fit.fitting import print_fit
 
 BAND = np.arange(7.6, 8.85, 0.05)  # Hz, about the lowest mode: a decay of 14 s distinguishes 0.07 Hz
 HELD = -0.07  # s, of the last sample at rest
@@ -49,7 +49,7 @@ def main() -> None:
         rows += [f"{f},beam.tip/y,beam.tip/y,{h.real},{h.imag}" for f, h in zip(BAND, static * response(), strict=True)]
         (folder / "decay.csv").write_text("\n".join(rows))
         (folder / "tests.toml").write_text('[[test]]\nname = "decay 1"\nfile = "decay.csv"\nunit = "m/N"\n')
-        print_responses(ffrobot.fit_responses(folder / "scene.toml", folder / "tests.toml", KEYS), Console(width=140))
+        print_fit(ffrobot.fit_responses(folder / "scene.toml", folder / "tests.toml", KEYS), Console(width=140))
 
 
 if __name__ == "__main__":

@@ -96,6 +96,7 @@ def fit(file: Path, measured: Path | None, frf: Path | None, vary: tuple[str, ..
     Prints uncertainties of the values, and rejects keys that the measurement cannot distinguish. FRFs of a robot are
     compared in the poses of their tests; a picture shows measured and fitted curves.
     """  # noqa: D301 (click wants the backspace itself)
+    from ..fit.fitting import fit_measured, print_fit
     from ..present.console import summary_console
 
     table = measured or frf
@@ -104,14 +105,12 @@ def fit(file: Path, measured: Path | None, frf: Path | None, vary: tuple[str, ..
     protect_scene(file, table)
     keys, console = [key for text in vary for key in text.split(",")], summary_console()
     if measured:
-        from ..fit.fitting import fit_measured, print_fit
-
         print_fit(fit_measured(file, measured, keys, **how), console)
     else:
-        from ..fit.frf import draw_responses, fit_responses, print_responses
+        from ..fit.frf import draw_responses, fit_responses
 
         fitted = fit_responses(file, table, keys, **how | {"motors": how["motors"] or "locked"})
-        print_responses(fitted, console)
+        print_fit(fitted, console)
         picture = draw_responses(fitted, Path(fitted.files[-1]).with_suffix(".png"))
         console.out(f"figure: {picture}")
 

@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import tomli_w
@@ -17,7 +17,7 @@ from rich.console import Console
 from ..actuation.control.linear import LinearModels
 from ..actuation.control.linear_model import locked_frequencies, robot_modes
 from ..common.arrays import Array
-from ..common.errors import FfrobotError, InputError, quoted
+from ..common.errors import FfrobotError, InputError
 from ..common.files import AnyPath, check_new_file, write_atomically
 from ..common.toml_files import load_toml, read_text
 from ..common.validation import check_texts
@@ -30,10 +30,9 @@ from ..run.solve import solve_scene
 from ..run.watcher import Watcher
 from ..scene.load import load_scene, make_scene
 from ..scene.scene import Scene
-from ..sweep.files import LINKS, run_files, set_key, value_of
+from ..sweep.files import LINKS, number_at, run_files, set_key
+from ..sweep.sweep import Key, check_once
 from .least_squares import Fit, Parameters, fit_frequencies
-
-Key = tuple[str, ...]
 
 VALUE = r'("[^"\n]*"|[^\s,}\]#]+)'  # a text or a number
 
@@ -66,10 +65,6 @@ class LinkTarget:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._tables = load_toml(path, "link file")
-
-    def start(self, key: Key) -> object:
-        """Return the value of `key` in the file; None if absent."""
-        return value_of(self._tables, key)
 
     def modes(self, changes: dict[Key, float]) -> tuple[tuple[str, ...], Array]:
         """Return families and frequencies (k,), Hz, of the eigenmodes, the lowest first, with some values changed."""
@@ -106,14 +101,6 @@ class RobotTarget:
         load_scene(path)
         bodies = {body["name"]: body.get("link") for body in self._scene["body"]}
         self._links = {name: path.parent / link for name, link in bodies.items() if isinstance(link, str)}
-        self._tables: dict[str, Any] = {name: load_toml(link, "link file") for name, link in self._links.items()}
-        self._tables |= {name: link for name, link in bodies.items() if isinstance(link, dict)}
-
-    def start(self, key: Key) -> object:
-        """Return the value of `key` in the scene, or in a link file for `links.BODY.…`; None if absent."""
-        if key[0] != LINKS:
-            return value_of(self._scene, key)
-        return value_of(self._tables, key[1:]) if len(key) > 2 else None
 
     def scene(self, changes: Mapping[Key, float], kind: str, initial: Mapping[str, object] | None = None) -> Scene:
         """Return the scene with some values changed, one analysis of a `kind`, and other entries of [initial].
@@ -242,15 +229,11 @@ class VariedKeys:
         self.target, self._place = target, None if output is None else Path(output)
         self._groups = [tuple(tuple(name.strip().split(".")) for name in text.split("=")) for text in vary]
         keys = [key for group in self._groups for key in group]
-        if twice := {".".join(key) for key in keys if keys.count(key) > 1}:
-            raise InputError("--vary: expected each key once", f"{quoted(sorted(twice))} again")
-        self._starts: dict[Key, float] = {}
-        for key in keys:
-            value = target.start(key)
-            if isinstance(value, bool) or not isinstance(value, int | float) or value <= 0:
-                text = "none" if value is None else repr(value)
-                raise InputError(f"{path}: --vary: expected a number above 0 at {'.'.join(key)}", text)
-            self._starts[key] = float(value)
+        check_once(keys)
+        self._starts = {key: number_at(path, key, "--vary", "link or scene file") for key in keys}
+        for key, value in self._starts.items():
+            if value <= 0.0:
+                raise InputError(f"{path}: --vary: expected a number above 0 at {'.'.join(key)}", f"{value:g}")
         self.names = ["=".join(".".join(key) for key in group) for group in self._groups]
         self.start = np.array([self._starts[group[0]] for group in self._groups])
 
@@ -288,59 +271,14 @@ class VariedKeys:
         return tuple(map(str, texts))
 
 
-FEW = 30  # degrees of freedom below which two standard deviations are less than a range of 95 %
-ALIKE = 0.95  # correlation of two parameters' errors from which their values are hardly distinguished
-
-
-def print_fit(fit: Fit, console: Console) -> None:
-    """Print tables of parameters and modes, remarks, and the files written."""
-    print_parameters(fit, console)
-    modes = (
-        (label, *(f"{frequency:.6g}" for frequency in frequencies), f"{100 * error:+.3f} %")
-        for label, *frequencies, error in zip(fit.labels, fit.measured, fit.before, fit.after, fit.error, strict=True)
-    )
-    print_table(console, ("mode", "measured (Hz)", "start (Hz)", "fitted (Hz)", "error"), modes)
-    for line in (*remarks(fit), *(f"written: {path}" for path in fit.files)):
-        console.out(line)
-
-
-def print_parameters(fit: Parameters, console: Console) -> None:
-    """Print a table of the parameters."""
+def print_fit(fit: Parameters, console: Console) -> None:
+    """Print tables of parameters and of what was measured, remarks, and the files written."""
     rows = (
         (key, f"{start:.6g}", f"{value:.6g}",
          "not known" if np.isnan(spread) else f"{spread * value:.2g} ({100 * spread:.2g} %)")
         for key, start, value, spread in zip(fit.keys, fit.start, fit.value, fit.relative_deviation, strict=True)
     )  # fmt: skip
     print_table(console, ("key", "start", "fitted", "standard deviation"), rows)
-
-
-def remarks(fit: Fit) -> Iterator[str]:
-    """Yield notes on the accuracy of the fit."""
-    if np.isnan(fit.relative_deviation).any():
-        yield (
-            "as many frequencies as keys: they fit whatever their errors, so no uncertainty is known; give a column"
-            " uncertainty (Hz), or more modes"
-        )
-    if fit.degrees_of_freedom and fit.degrees_of_freedom < FEW:
-        wide, narrow = fit.coverage_factor(0.95), fit.coverage_factor(0.6827)
-        yield (
-            f"standard deviations are estimated from {fit.degrees_of_freedom} degrees of freedom: the range of 95 % is"
-            f" ± {wide:.3g} of them, that of 68 % ± {narrow:.3g} (Student's t); a column"
-            " uncertainty (Hz), or more modes, make it narrower"
-        )
-    yield from correlated(fit)
-    if fit.misfit > 2.0:
-        yield (
-            f"the remaining errors are {fit.misfit:.3g} times the uncertainties: the model lacks something that no"
-            " varied key describes"
-        )
-
-
-def correlated(fit: Parameters) -> Iterator[str]:
-    """Yield notes on pairs of parameters that are hardly distinguishable."""
-    for i, j in zip(*np.triu_indices(len(fit.keys), 1), strict=True):
-        if abs(fit.correlation[i, j]) > ALIKE:
-            yield (
-                f"{fit.keys[i]} and {fit.keys[j]} are hardly distinguishable: their errors have a correlation of"
-                f" {fit.correlation[i, j]:.4f}"
-            )
+    print_table(console, *fit.comparison())
+    for line in (*fit.remarks(), *(f"written: {path}" for path in fit.files)):
+        console.out(line)

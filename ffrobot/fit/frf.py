@@ -11,14 +11,13 @@ With Z = K + iωD − ω²M and rows J of the points' displacements, the recepta
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
 
 from ..common.arrays import Array, ComplexArray
 from ..common.errors import InputError, SolveError
@@ -32,16 +31,16 @@ from ..mbs.linear.poses import PoseEvaluator
 from ..mbs.posture.start import undeformed_posture
 from ..mbs.scene.mechanism import Initial
 from ..mbs.scene.space import SPACES
-from ..present.lines import print_table
 from ..run.prepare import prepare_scene, unsolved
 from ..run.result import Solution
 from .covariance import write_covariance
-from .fitting import Motors, RobotTarget, VariedKeys, correlated, print_parameters
+from .fitting import Motors, RobotTarget, VariedKeys
 from .frf_measured import MeasuredPose, read_tests
 from .least_squares import MOST_EVALUATIONS, Parameters, check_distinguishable, uncertainty_of
 
 UNSEEN = 0.5  # relative deviation of a parameter from which the tests hardly see it
 POOR = 0.8  # FRAC of an FRF that the model hardly has
+HEADING = ("test", "used for", "FRFs", "least FRAC", "mean FRAC", "peaks: largest error", "misfit")
 
 
 def fit_responses(
@@ -105,34 +104,6 @@ def _start(tests: Path, target: RobotTarget, pose: MeasuredPose) -> Initial | No
         return target.scene({}, "static", pose.test.pose).initial
     except InputError as error:
         raise InputError(f'{tests}: test "{pose.test.name}": pose:\n{error}') from None
-
-
-def print_responses(fit: ResponseFit, console: Console) -> None:
-    """Print tables of parameters and poses, remarks, and the files written."""
-    print_parameters(fit, console)
-    rows = []
-    for one in fit.poses:
-        errors, frac = one.frequency_error, one.frac
-        peaks = f"{100 * errors[np.abs(errors).argmax()]:+.2f} % of {len(errors)}" if len(errors) else "none"
-        use = "validation" if one.pose.test.validation else "fit"
-        of_frac = str(len(frac)), f"{frac.min():.4f}", f"{frac.mean():.4f}"
-        rows.append((one.pose.test.name, use, *of_frac, peaks, f"{100 * one.misfit:.2g} %"))
-    heading = ("test", "used for", "FRFs", "least FRAC", "mean FRAC", "peaks: largest error", "misfit")
-    print_table(console, heading, rows)
-    for line in (*remarks(fit), *(f"written: {path}" for path in fit.files)):
-        console.out(line)
-
-
-def remarks(fit: ResponseFit) -> Iterator[str]:
-    """Yield notes on parameters with large deviations, and on FRFs that the model lacks."""
-    for key, deviation in zip(fit.keys, fit.relative_deviation, strict=True):
-        if deviation > UNSEEN:
-            yield f"the tests hardly see {key}: its standard deviation is {100 * deviation:.2g} % of it"
-    yield from correlated(fit)
-    for one in fit.poses:
-        for response, frac in zip(one.pose.responses, one.frac, strict=True):
-            if frac < POOR:
-                yield f'test "{one.pose.test.name}": {response.label}: FRAC {frac:.3f}: the model lacks something there'
 
 
 Equations = Callable[[Array], Sequence[Array]]
@@ -237,6 +208,14 @@ class PoseComparison:
         """Root mean square of |ln(H/H_measured)|, about the relative error."""
         return float(np.sqrt(np.mean(np.abs(np.log(self.after / self.pose.receptance)) ** 2)))
 
+    def row(self) -> tuple[str, ...]:
+        """Return cells below `HEADING`."""
+        errors, frac = self.frequency_error, self.frac
+        peaks = f"{100 * errors[np.abs(errors).argmax()]:+.2f} % of {len(errors)}" if len(errors) else "none"
+        use = "validation" if self.pose.test.validation else "fit"
+        of_frac = str(len(frac)), f"{frac.min():.4f}", f"{frac.mean():.4f}"
+        return self.pose.test.name, use, *of_frac, peaks, f"{100 * self.misfit:.2g} %"
+
 
 def _peaks(frequency: Array, H: ComplexArray, prominence: float) -> Array:
     """Frequencies of peaks that stand out by `prominence` of the logarithm, by the parabola through three points."""
@@ -247,12 +226,27 @@ def _peaks(frequency: Array, H: ComplexArray, prominence: float) -> Array:
     return frequency[at] + shift * 0.5 * (frequency[at + 1] - frequency[at - 1])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ResponseFit(Parameters):
-    """Parameters fitted to FRFs, and these in all poses; `files`: the files written."""
+    """Parameters fitted to FRFs, and these in all poses."""
 
     poses: tuple[PoseComparison, ...]
-    files: tuple[str, ...] = ()
+
+    def comparison(self) -> tuple[Sequence[str], Iterator[Sequence[str]]]:
+        """Heading and rows of the table of poses."""
+        return HEADING, map(PoseComparison.row, self.poses)
+
+    def remarks(self) -> Iterator[str]:
+        """Yield notes on parameters with large deviations, and on FRFs that the model lacks."""
+        for key, deviation in zip(self.keys, self.relative_deviation, strict=True):
+            if deviation > UNSEEN:
+                yield f"the tests hardly see {key}: its standard deviation is {100 * deviation:.2g} % of it"
+        yield from super().remarks()
+        for one in self.poses:
+            for label, frac in zip(one.pose.labels, one.frac, strict=True):
+                if frac < POOR:
+                    where = f'test "{one.pose.test.name}": {label}'
+                    yield f"{where}: FRAC {frac:.3f}: the model lacks something there"
 
 
 class _Residuals:
@@ -294,18 +288,15 @@ class _Residuals:
             apart = (np.arange(places[0], places[-1] + width / 4, width / 4)[:, None] - places) / width
             weights = np.exp(-0.5 * apart**2)
             smoothing.append(weights / weights.sum(axis=1, keepdims=True))
-        known: dict[bytes, tuple[Array, Array]] = {}
 
-        def at(x: Array) -> tuple[Array, Array]:
-            if x.tobytes() not in known:
-                known.clear()
-                known[x.tobytes()] = self.at(x, smoothing)
-            return known[x.tobytes()]
+        @lru_cache(1)
+        def at(x: bytes) -> tuple[Array, Array]:
+            return self.at(np.frombuffer(x), smoothing)
 
         found = scipy.optimize.least_squares(
-            lambda x: at(x)[0],
+            lambda x: at(x.tobytes())[0],
             np.zeros(len(self._center)),
-            jac=lambda x: at(x)[1],
+            jac=lambda x: at(x.tobytes())[1],
             bounds=(-1.5, 1.5),
             x_scale="jac",
             max_nfev=MOST_EVALUATIONS,
@@ -329,10 +320,10 @@ def _receptances(equations: Sequence[Array], poses: Sequence[MeasuredPose]) -> l
     """The FRFs (F, p) of all poses. Raises `InputError` for one of directions in which the robot does not move."""
     found = [receptance(of, pose)[0] for of, pose in zip(equations, poses, strict=True)]
     for pose, H in zip(poses, found, strict=True):
-        for one, h in zip(pose.responses, H.T, strict=True):
-            if np.abs(h).max() <= NO_MOTION * np.abs(one.receptance).max():
+        for label, h, measured in zip(pose.labels, H.T, pose.receptance.T, strict=True):
+            if np.abs(h).max() <= NO_MOTION * np.abs(measured).max():
                 raise InputError(
-                    f'test "{pose.test.name}": {one.label}: expected an FRF of directions in which the model moves',
+                    f'test "{pose.test.name}": {label}: expected an FRF of directions in which the model moves',
                     "one without motion in the model: leave it out",
                 )
     return found
@@ -379,13 +370,11 @@ def fit_receptances(
     check_distinguishable(J, keys, "FRFs")
     if not converged:
         raise SolveError(f"fit: no convergence within {MOST_PLACES} places: start nearer to the measured FRFs")
-    deviation, correlation = uncertainty_of(J, r, known=all(pose.is_known for pose in fitted))
     return ResponseFit(
         keys=tuple(keys),
         start=start,
         value=theta,
-        relative_deviation=deviation,
-        correlation=correlation,
+        **uncertainty_of(J, r, known=all(pose.test.averages is not None for pose in fitted)),
         poses=tuple(map(PoseComparison, poses, before, _receptances(equations(theta), poses))),
     )
 
@@ -397,20 +386,22 @@ def draw_responses(fit: ResponseFit, path: Path) -> Path:
     """
     from matplotlib.figure import Figure
 
-    from ..pictures.figures.style import SIZE, style
+    from ..pictures.figures.plot import image_of
+    from ..pictures.figures.style import SIZE, literal, style
     from ..pictures.projection import COLORS
 
-    poses, content = fit.poses[:3], io.BytesIO()
+    poses = fit.poses[:3]
     with style():
         figure = Figure(figsize=(SIZE[0] * max(len(poses), 1), 1.4 * SIZE[1]), layout="constrained")
         axes = figure.subplots(2, len(poses), squeeze=False, sharex="col", height_ratios=(2, 1))
         for (above, below), one in zip(axes.T, poses, strict=True):
-            f = one.pose.frequency
-            pairs = sorted(zip(one.pose.responses, one.after.T, strict=True), key=lambda pair: not pair[0].is_direct)
-            for (response, fitted), color in zip(pairs[:3], COLORS, strict=False):
-                measured = response.receptance
+            pose = one.pose
+            f = pose.frequency
+            order = sorted(range(len(pose.labels)), key=lambda k: pose.force[k] != pose.response[k])
+            for k, color in zip(order[:3], COLORS, strict=False):
+                measured, fitted = pose.receptance[:, k], one.after[:, k]
                 above.semilogy(f, 1e3 * np.abs(measured), ".", color=color, markersize=2.0)
-                above.semilogy(f, 1e3 * np.abs(fitted), color=color, label=response.label)
+                above.semilogy(f, 1e3 * np.abs(fitted), color=color, label=pose.labels[k])
                 below.plot(f, np.degrees(np.angle(measured)), ".", color=color, markersize=2.0)
                 below.plot(f, np.degrees(np.angle(fitted)), color=color)
             above.set_title(f"{one.pose.test.name}{' (validation)' * one.pose.test.validation}", loc="left")
@@ -419,6 +410,5 @@ def draw_responses(fit: ResponseFit, path: Path) -> Path:
             below.set_ylabel("phase (°)")
             below.set_yticks([-180, -90, 0, 90, 180])
             below.set_xlabel("frequency (Hz)")
-        figure.savefig(content, format="png")
-    write_atomically(path, content.getvalue(), "picture", ours=True)
+        write_atomically(path, image_of(literal(figure), "png"), "picture", ours=True)
     return path

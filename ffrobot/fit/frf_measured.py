@@ -203,26 +203,6 @@ class Direction(NamedTuple):
         return f"{self.point} ({', '.join(f'{x:.3g}' for x in self.axis)})"
 
 
-@struct
-class MeasuredResponse:
-    """A measured FRF of `response` by `force`: receptance (F,), m/N, and coherence (F,), NaN where unknown."""
-
-    force: Direction
-    response: Direction
-    receptance: ComplexArray
-    coherence: Array
-
-    @property
-    def is_direct(self) -> bool:
-        """Whether the response is measured where, and in the direction in which, the force acts."""
-        return self.force == self.response
-
-    @property
-    def label(self) -> str:
-        """Text of the directions of force and response."""
-        return f"{self.force.label} → {self.response.label}"
-
-
 class Ends(NamedTuple):
     """The directions of p FRFs, each once, and the indices (p,) of those of force and response among them."""
 
@@ -233,11 +213,17 @@ class Ends(NamedTuple):
 
 @struct
 class MeasuredPose:
-    """The FRFs of one test at `frequency` (F,), Hz; `deviation` (F, p): relative standard deviation, or a weight."""
+    """The FRFs of one test at `frequency` (F,), Hz; `deviation` (F, p): relative standard deviation, or a weight.
+
+    Receptances (F, p), m/N, of `response` by `force`, p each, and coherence (F, p), NaN where unknown.
+    """
 
     test: ResponseTest
     frequency: Array
-    responses: tuple[MeasuredResponse, ...]
+    force: tuple[Direction, ...]
+    response: tuple[Direction, ...]
+    receptance: ComplexArray
+    coherence: Array
 
     @cached_property
     def omega(self) -> Array:
@@ -247,20 +233,14 @@ class MeasuredPose:
     @cached_property
     def ends(self) -> Ends:
         """Directions of forces and responses."""
-        pairs = [(one.force, one.response) for one in self.responses]
-        directions = list(dict.fromkeys(end for pair in pairs for end in pair))
-        force, response = ([directions.index(end) for end in ends] for ends in zip(*pairs, strict=True))
+        directions = list(dict.fromkeys((*self.force, *self.response)))
+        force, response = ([directions.index(end) for end in ends] for ends in (self.force, self.response))
         return Ends(directions, force, response)
 
-    @cached_property
-    def receptance(self) -> ComplexArray:
-        """Measured receptances (F, p), m/N."""
-        return np.column_stack([one.receptance for one in self.responses])
-
     @property
-    def is_known(self) -> bool:
-        """Whether coherence and averages determine the deviations."""
-        return self.test.averages is not None
+    def labels(self) -> list[str]:
+        """Texts (p) of the directions of force and response."""
+        return [f"{force.label} → {response.label}" for force, response in zip(self.force, self.response, strict=True)]
 
     @cached_property
     def deviation(self) -> Array:
@@ -268,9 +248,8 @@ class MeasuredPose:
 
         1 where the coherence γ² is not known.
         """
-        coherence = np.column_stack([one.coherence for one in self.responses])
         averages = self.test.averages or 2
-        spread = np.sqrt((1.0 - coherence) / (2.0 * averages * np.maximum(coherence, FLOOR)))
+        spread = np.sqrt((1.0 - self.coherence) / (2.0 * averages * np.maximum(self.coherence, FLOOR)))
         return np.where(np.isnan(spread), 1.0, np.maximum(spread, FLOOR))
 
 
@@ -288,17 +267,20 @@ def _read(path: Path, test: ResponseTest) -> MeasuredPose:
     frequency = columns[0].frequency
     low, high = test.band or (-np.inf, np.inf)
     inside = (frequency >= low) & (frequency <= high)
+    if not inside.any():
+        raise InputError(f'{path}: test "{test.name}": band: expected frequencies of the file within it', "none")
+    responses = []
     for column in columns:
         where = f"{test.file}: {column.force} → {column.response}"
         if len(column.frequency) != len(frequency) or not np.allclose(column.frequency, frequency, rtol=1e-9):
             raise InputError(f"{where}: expected the frequencies of the other functions", "others")
         _check(where, column, inside)
-    if not inside.any():
-        raise InputError(f'{path}: test "{test.name}": band: expected frequencies of the file within it', "none")
-    responses = tuple(_response(test, column, inside) for column in columns)
-    if test.averages is not None and any(np.isnan(one.coherence).any() for one in responses):
+        responses.append(_response(where, test, column, inside))
+    force, response, receptance, coherence = zip(*responses, strict=True)
+    if test.averages is not None and np.isnan(coherence).any():
         raise InputError(f'{path}: test "{test.name}": averages: expected them with a coherence in the file', "none")
-    return MeasuredPose(test, frequency[inside], responses)
+    of_columns = np.transpose(receptance), np.transpose(coherence)
+    return MeasuredPose(test, frequency[inside], force, response, *of_columns)
 
 
 def _check(where: str, column: Column, inside: Booleans) -> None:
@@ -306,7 +288,7 @@ def _check(where: str, column: Column, inside: Booleans) -> None:
     at, values = column.frequency[inside], column.values[inside]
     if not (np.diff(column.frequency) > 0.0).all():
         raise InputError(f"{where}: expected each frequency once, in rising order", "others")
-    if len(at) and not at.min() > 0.0:
+    if not at.min() > 0.0:
         raise InputError(
             f"{where}: expected frequencies above 0 Hz",
             f"{at.min():g}: the key band, such as [5.0, 200.0], leaves them out",
@@ -321,8 +303,10 @@ def _check(where: str, column: Column, inside: Booleans) -> None:
         raise InputError(f"{where}: coherence: expected values from 0 to 1", f"{worst:g}")
 
 
-def _response(test: ResponseTest, column: Column, inside: Booleans) -> MeasuredResponse:
-    where = f"{test.file}: {column.force} → {column.response}"
+def _response(
+    where: str, test: ResponseTest, column: Column, inside: Booleans
+) -> tuple[Direction, Direction, ComplexArray, Array]:
+    """Directions of force and response, receptance (F,), m/N, and coherence (F,), NaN where unknown."""
     order, factor = UNITS[test.unit] if test.unit else (column.order, 1.0)
     if test.unit is None and not column.is_si:
         raise InputError(f"{where}: expected the key unit of the test, one of {quoted(UNITS)}", "none")
@@ -333,7 +317,7 @@ def _response(test: ResponseTest, column: Column, inside: Booleans) -> MeasuredR
     force, response = (_direction(where, text, test.points, axes) for text in (column.force, column.response))
     receptance = column.values[inside] * factor / (2j * np.pi * column.frequency[inside]) ** order
     coherence = np.full(len(receptance), np.nan) if column.coherence is None else column.coherence[inside]
-    return MeasuredResponse(force, response, receptance, coherence)
+    return force, response, receptance, coherence
 
 
 def _direction(where: str, text: str, points: Mapping[str, str], axes: Array) -> Direction:

@@ -5,8 +5,10 @@ relative uncertainty s_i of the measured f_i, or 1 where none is known. With J =
 is σ² (JᵀJ)⁻¹, where σ² is 1 with known uncertainties and else |r|²/(m − n) (Seber and Wild, Nonlinear Regression, 2.1).
 """
 
-from collections.abc import Callable, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -18,13 +20,15 @@ STEP = 1e-3  # of ln θ, on both sides: frequencies of finite elements are known
 NO_EFFECT = 1e-4  # of a parameter, or a combination, against the largest: differences have errors of 1e-6
 SHARE = 0.1  # of the largest: entries of a combination that are named
 MOST_EVALUATIONS = 100
+FEW = 30  # degrees of freedom below which two standard deviations are less than a range of 95 %
+ALIKE = 0.95  # correlation of two parameters' errors from which their values are hardly distinguished
 
 Frequencies = Callable[[Array], Array]
 """Frequencies (m,), Hz, of parameters (n,)."""
 
 
-@dataclass(frozen=True)
-class Parameters:
+@dataclass(frozen=True, kw_only=True)
+class Parameters(ABC):
     """Fitted parameters, n.
 
     Attributes:
@@ -32,6 +36,7 @@ class Parameters:
         start, value: (n,) before and after.
         relative_deviation: (n,) standard deviations of the parameters, relative to them; NaN where not known.
         correlation: (n, n) of the parameters' errors; NaN where not known.
+        files: the files written.
     """
 
     keys: tuple[str, ...]
@@ -39,14 +44,28 @@ class Parameters:
     value: Array
     relative_deviation: Array
     correlation: Array
+    files: tuple[str, ...] = ()
 
     @property
     def deviation(self) -> Array:
         """Standard deviations (n,) of the parameters, in their units."""
         return self.relative_deviation * self.value
 
+    @abstractmethod
+    def comparison(self) -> tuple[Sequence[str], Iterator[Sequence[str]]]:
+        """Heading and rows of a table with what was measured and what the model has."""
 
-@dataclass(frozen=True)
+    def remarks(self) -> Iterator[str]:
+        """Yield notes on the accuracy of the fit; here on pairs of parameters that are hardly distinguishable."""
+        for i, j in zip(*np.triu_indices(len(self.keys), 1), strict=True):
+            if abs(self.correlation[i, j]) > ALIKE:
+                yield (
+                    f"{self.keys[i]} and {self.keys[j]} are hardly distinguishable: their errors have a correlation of"
+                    f" {self.correlation[i, j]:.4f}"
+                )
+
+
+@dataclass(frozen=True, kw_only=True)
 class Fit(Parameters):
     """Parameters fitted to frequencies, and these before and after, m.
 
@@ -54,7 +73,6 @@ class Fit(Parameters):
         labels: (m) names of the modes.
         measured, before, after: (m,) Hz.
         uncertainty: (m,) standard deviations of `measured`, Hz; None where not known.
-        files: the files written.
     """
 
     labels: tuple[str, ...]
@@ -62,7 +80,6 @@ class Fit(Parameters):
     before: Array
     after: Array
     uncertainty: Array | None
-    files: tuple[str, ...] = ()
 
     @property
     def degrees_of_freedom(self) -> int | None:
@@ -95,6 +112,36 @@ class Fit(Parameters):
         if self.uncertainty is None or spare == 0:
             return float("nan")
         return float(np.linalg.norm((self.after - self.measured) / self.uncertainty) / np.sqrt(spare))
+
+    def comparison(self) -> tuple[Sequence[str], Iterator[Sequence[str]]]:
+        """Heading and rows of the table of modes."""
+        columns = self.labels, self.measured, self.before, self.after, self.error
+        rows = (
+            (label, *(f"{frequency:.6g}" for frequency in frequencies), f"{100 * error:+.3f} %")
+            for label, *frequencies, error in zip(*columns, strict=True)
+        )
+        return ("mode", "measured (Hz)", "start (Hz)", "fitted (Hz)", "error"), rows
+
+    def remarks(self) -> Iterator[str]:
+        """Yield notes on the accuracy of the fit."""
+        if np.isnan(self.relative_deviation).any():
+            yield (
+                "as many frequencies as keys: they fit whatever their errors, so no uncertainty is known; give a column"
+                " uncertainty (Hz), or more modes"
+            )
+        if self.degrees_of_freedom and self.degrees_of_freedom < FEW:
+            wide, narrow = self.coverage_factor(0.95), self.coverage_factor(0.6827)
+            yield (
+                f"standard deviations are estimated from {self.degrees_of_freedom} degrees of freedom: the range of"
+                f" 95 % is ± {wide:.3g} of them, that of 68 % ± {narrow:.3g} (Student's t); a column uncertainty (Hz),"
+                " or more modes, make it narrower"
+            )
+        yield from super().remarks()
+        if self.misfit > 2.0:
+            yield (
+                f"the remaining errors are {self.misfit:.3g} times the uncertainties: the model lacks something that no"
+                " varied key describes"
+            )
 
 
 def fit_frequencies(
@@ -136,14 +183,12 @@ def fit_frequencies(
         raise SolveError(f"fit: no convergence within {MOST_EVALUATIONS} steps: start nearer to the measured values")
     J, r = jacobian(optimum.x), optimum.fun
     check_distinguishable(J, keys)
-    deviation, correlation = uncertainty_of(J, r, known=uncertainty is not None)
     before, after = (measured * (1.0 + residuals(x) / weight) for x in (origin, optimum.x))
     return Fit(
         keys=tuple(keys),
         start=start,
         value=start * np.exp(optimum.x),
-        relative_deviation=deviation,
-        correlation=correlation,
+        **uncertainty_of(J, r, known=uncertainty is not None),
         labels=tuple(labels),
         measured=measured,
         before=before,
@@ -177,15 +222,16 @@ def check_distinguishable(
     )
 
 
-def uncertainty_of(J: Array, r: Array, *, known: bool) -> tuple[Array, Array]:
-    """Return standard deviations (n,) of ln θ, and correlations (n, n), by J (m, n) and residuals r (m,).
+def uncertainty_of(J: Array, r: Array, *, known: bool) -> dict[str, Any]:
+    """Return the `relative_deviation` and `correlation` of `Parameters` by J (m, n) and residuals r (m,).
 
     NaN for m = n without `known` uncertainties of the measured values.
     """
     m, n = J.shape
     if not known and m == n:
-        return np.full(n, np.nan), np.full((n, n), np.nan)
+        return {"relative_deviation": np.full(n, np.nan), "correlation": np.full((n, n), np.nan)}
     variance = 1.0 if known else float(r @ r) / (m - n)
     inverse = np.linalg.inv(J.T @ J)
     deviation = np.sqrt(np.diag(inverse))
-    return np.sqrt(variance) * deviation, inverse / np.outer(deviation, deviation)
+    correlation = inverse / np.outer(deviation, deviation)
+    return {"relative_deviation": np.sqrt(variance) * deviation, "correlation": correlation}

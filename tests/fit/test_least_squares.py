@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from ffrobot.common.errors import InputError
-from ffrobot.fit.fitting import remarks
 from ffrobot.fit.least_squares import fit_frequencies
 
 LABELS = [f"mode {k}" for k in range(1, 6)]
@@ -55,10 +54,10 @@ def test_few_degrees_of_freedom_are_named():
     noisy = chain(TRUE) * [1.001, 0.999, 1.0, 1.002, 0.999]
     fit = fit_frequencies(chain, KEYS, 1.3 * TRUE, LABELS, noisy)
     assert fit.coverage_factor(0.95) == pytest.approx(0.95 * np.sqrt(2 / (1 - 0.95**2)), rel=1e-9)
-    told = "\n".join(remarks(fit))
+    told = "\n".join(fit.remarks())
     assert "estimated from 2 degrees of freedom: the range of 95 % is ± 4.3 of them" in told
     known = fit_frequencies(chain, KEYS, 1.3 * TRUE, LABELS, noisy, 0.01 * noisy)
-    assert "degrees of freedom" not in "\n".join(remarks(known))
+    assert "degrees of freedom" not in "\n".join(known.remarks())
 
 
 def test_as_many_frequencies_as_parameters_leave_the_uncertainty_open():
