@@ -68,7 +68,7 @@ def _body(convert: Callable[[ModalBody], Converted], path: Path, *_: Any) -> Mad
 
 FORMATS: Mapping[str, Mapping[str, tuple[str, Callable[[Path, str | None, Side], Made]]]] = {
     "results": {
-        "csv": (".csv", partial(_motion, lambda motion: (csv_text(motion), motion.remarks), "{joints} joints")),
+        "csv": (".csv", partial(_motion, csv_text, "{joints} joints")),
         "joint-trajectory": (".joint-trajectory.json", partial(_motion, joint_trajectory_text, "{points} points")),
         "rosbag2": (".rosbag2", partial(_motion, joint_trajectory_bag, "a JointTrajectory with {points} points")),
         "fmu": (".fmu", lambda path, analysis, _: linear_fmu(path, analysis)),

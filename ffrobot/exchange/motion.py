@@ -102,8 +102,8 @@ def _parts(results: Results, analysis: str, joint: str) -> Iterator[JointMotion]
         yield JointMotion(joint if len(coordinate) == 1 else f"{joint}[{k}]", *values, motor)
 
 
-def csv_text(motion: JointMotions) -> str:
-    """Return a CSV table: `time`, NAME.coordinate, NAME.rate and, with a motor, NAME.moment of joints; SI units.
+def csv_text(motion: JointMotions) -> tuple[str, tuple[str, ...]]:
+    """Return a CSV table, and remarks: `time`, NAME.coordinate, NAME.rate and, with a motor, NAME.moment; SI units.
 
     Of joints with compliant gears also NAME.motor_coordinate, NAME.motor_rate, NAME.motor_moment.
     """
@@ -113,7 +113,7 @@ def csv_text(motion: JointMotions) -> str:
         if joint.moment is not None:
             columns[f"{joint.name}.moment"] = joint.moment
         columns |= {f"{joint.name}.{key}": values for key, values in joint.motor.items()}
-    return as_csv([columns, *as_rows(np.stack(list(columns.values()), axis=1))])
+    return as_csv([columns, *as_rows(np.stack(list(columns.values()), axis=1))]), motion.remarks
 
 
 def joint_trajectory(motion: JointMotions) -> tuple[dict[str, Any], tuple[str, ...]]:

@@ -143,7 +143,7 @@ class _Search:
     def _along(self, factor: float) -> Array:
         """Set points of the record, in `factor` times the time."""
         count = int(np.ceil(factor * self.times[-1] / self.step - 1e-9)) + 1
-        return _between(self.step * np.arange(count) / factor, self.times, self.values)
+        return interpolated(self.times, self.values, 1).sample(self.step * np.arange(count) / factor)
 
     def _averaged(self, values: Array, duration: float) -> Array:
         n = int(np.ceil(duration / self.step - 1e-9))
@@ -160,7 +160,8 @@ class _Search:
                 sequence = impulses(kind, 1 / period, min(ratio, 0.9))
                 last = int(np.ceil(sequence[-1].delay / self.step))
                 rows = np.arange(len(shaped) + last, dtype=float)
-                before = [_between(rows - one.delay / self.step, rows[: len(shaped)], shaped) for one in sequence]
+                lines = interpolated(rows[: len(shaped)], shaped, 1)
+                before = [lines.sample(rows - one.delay / self.step) for one in sequence]
                 shaped = np.tensordot([one.share for one in sequence], before, 1)
             frequencies = ", ".join(f"{1 / period:.3g} Hz" for period in self.periods[:count])
             yield f"{kind} for {frequencies}", shaped
@@ -210,8 +211,3 @@ def distances(points: Array, line: Array) -> Array:
         part = np.einsum("ij,ij->i", apart, along) / np.maximum(np.einsum("ij,ij->i", along, along), TINY)
         off.append(np.linalg.norm(apart - np.clip(part, 0.0, 1.0)[:, None] * along, axis=1))
     return np.minimum(*off)
-
-
-def _between(at: Array, times: Array, values: Array) -> Array:
-    """(len(at), n) on the lines through values (T, n) at `times` (T,)."""
-    return np.column_stack([np.interp(at, times, column) for column in values.T])

@@ -85,18 +85,10 @@ def _lines(smoothed: Smoothed) -> list[tuple[str, str]]:
 
 
 def _motions(smoothed: Smoothed) -> Iterator[tuple[str, ...]]:
-    before = smoothed.before
-    last, settling = float(before.recording.times[-1]), before.ride.settling
-    assert settling is not None
-    own = ("as it is", last, last + settling.time_to, before.residual, 0.0, smoothed.excess, smoothed.torque)
-    new = (
-        (one.name, one.times[-1], one.settled, one.residual, one.off_path, one.excess, one.torque)
-        for one in smoothed.candidates
-    )
-    for name, duration, settled, residual, off_path, *of_limits in (own, *new):
-        parts = (f"{100 * of_limit:.3g} %" if of_limit else "" for of_limit in of_limits)
-        numbers = (f"{duration:.4g}", f"{settled:.4g}" if np.isfinite(settled) else "no", f"{1e3 * residual:.3g}")
-        yield name, *numbers, f"{off_path:.2g}", *parts
+    for one in (smoothed.own, *smoothed.candidates):
+        settled = f"{one.settled:.4g}" if np.isfinite(one.settled) else "no"
+        parts = (f"{100 * of_limit:.3g} %" if of_limit else "" for of_limit in (one.excess, one.torque))
+        yield one.name, f"{one.times[-1]:.4g}", settled, f"{1e3 * one.residual:.3g}", f"{one.off_path:.2g}", *parts
 
 
 def _rows(of: Diagnosis) -> Iterator[tuple[str, ...]]:
@@ -143,12 +135,10 @@ def _spectrum(axes: Axes, of: Diagnosis, unit: str) -> None:
 
 
 def _distance(axes: Axes, smoothed: Smoothed) -> None:
-    before, tolerance = smoothed.before, smoothed.robot.tolerance
-    rides = [("as it is", before.recording.times[-1], before.ride)]
-    rides += [(one.name, one.times[-1], one.ride) for one in smoothed.candidates[:1]]
-    for name, last, ride in rides:
-        (line,) = axes.plot(ride.times, 1e3 * np.maximum(ride.off, LEAST * tolerance), label=name)
-        axes.axvline(last, color=line.get_color(), linewidth=0.8, linestyle=":")
+    tolerance = smoothed.robot.tolerance
+    for one in (smoothed.own, *smoothed.candidates[:1]):
+        (line,) = axes.plot(one.ride.times, 1e3 * np.maximum(one.ride.off, LEAST * tolerance), label=one.name)
+        axes.axvline(one.times[-1], color=line.get_color(), linewidth=0.8, linestyle=":")
     axes.axhline(1e3 * tolerance, color="0.6", linewidth=0.8, linestyle="--", label="tolerance")
     axes.set_yscale("log")
     axes.set_title(f"distance of {smoothed.robot.point} from its final place (mm)")

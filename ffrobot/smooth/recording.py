@@ -17,6 +17,7 @@ from ..mbs.analysis.pcid import Pcid
 from ..mbs.fields.waypoints import column_of, difference_quotients, load_record
 from ..mbs.joints.joint import JointRecord
 from ..mbs.quantities.motion import joint_motion
+from ..mbs.run.record import Run
 from ..mbs.scene.analysis import TimedAnalysis
 from ..run.solve import solve_scene
 from ..run.watcher import Watcher
@@ -124,9 +125,12 @@ def planned(scene: Scene, step: float, watcher: Watcher) -> Recording:
     analysis = Pcid(name="plan", kind="pcid", end=outputs * step, output_step=step)
     solution = solve_scene(scene.model_copy(update={"trajectory": paths, "analysis": (analysis,)}), watcher)
     run, joints = solution.analyses["plan"].run, tuple(joint.name for joint in scene.motor_joints)
-    motions = [joint_motion(run, joint) for joint in joints]
-    values = np.column_stack([coordinate for coordinate, _ in filter(None, motions)])
-    return without_rest(Recording(joints, run.time, values, run.time))
+    return without_rest(Recording(joints, run.time, coordinates(run, joints), run.time))
+
+
+def coordinates(run: Run, joints: Sequence[str]) -> Array:
+    """Return coordinates (T, n) of n joints, behind their gears, rad or m."""
+    return np.column_stack([motion[0] for joint in joints if (motion := joint_motion(run, joint))])
 
 
 def _check_unit(path: Path, joints: Sequence[JointRecord], values: Array) -> None:

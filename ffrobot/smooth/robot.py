@@ -12,7 +12,7 @@ from ..mbs.fields.paths import Piecewise
 from ..mbs.linear.joint_conditions import COMPLIANT, LOCKED, free_coordinates
 from ..mbs.linear.linearisation import LinearEquations
 from ..mbs.model.gears import with_compliance
-from ..mbs.quantities.motion import joint_motion, section_motion
+from ..mbs.quantities.motion import section_motion
 from ..mbs.quantities.settling import Settling, commanded_rest, settling
 from ..mbs.quantities.supply import gear_motions, motor_moments
 from ..mbs.run.record import Run
@@ -22,6 +22,7 @@ from ..run.prepare import prepare_scene, unsolved
 from ..run.solve import run_analyses
 from ..run.watcher import Watcher
 from ..scene.scene import Scene
+from .recording import coordinates
 from .servo import Servo
 
 RUN = "motion"
@@ -147,7 +148,8 @@ class Robot:
         )
         still = replace(run, model=rest.model, q=rest.q[None], v=0 * run.v[:1])
         off = np.linalg.norm(section_motion(run, self.point).r - section_motion(still, self.point).r[0], axis=1)
-        sag = np.vstack([self._coordinates(run)[:1] - command[0], self._coordinates(still) - command[-1]])
+        places = (coordinates(of, self.joints)[0] for of in (run, still))
+        sag = np.array([place - own for place, own in zip(places, command[[0, -1]], strict=True)])
         return Ride(replace(whole, residual=soon.residual), run.time, off, postures, torque, sag)
 
     def inverted(self, times: Array, motion: Piecewise) -> tuple[Array, Array]:
@@ -168,11 +170,6 @@ class Robot:
         command = self.servo.command(times[1], position, np.pad(rate, around))
         command[[0, -1]] = position[[0, -1]]  # at rest, whatever derivatives jump there
         return command, moments
-
-    def _coordinates(self, run: Run) -> Array:
-        """(T, n) of joints behind their gears."""
-        motions = (joint_motion(run, joint) for joint in self.joints)
-        return np.column_stack([coordinate for coordinate, _ in filter(None, motions)])
 
     def _lowest(self, path: Piecewise) -> float:
         """Hz, of the posture in which the robot starts."""

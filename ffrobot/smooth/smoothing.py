@@ -8,7 +8,7 @@ import numpy as np
 from ..common.errors import InputError, SolveError, check_known, either, quoted
 from ..common.files import AnyPath, check_new_file, check_new_folder
 from ..common.structs import struct
-from ..exchange.export import Content, write_content
+from ..exchange.export import Converted, write_content
 from ..exchange.motion import (
     JointMotion,
     JointMotions,
@@ -62,14 +62,11 @@ class Smoothed:
         return self.candidates[0]
 
     @property
-    def excess(self) -> float:
-        """The largest of speed, acceleration and jerk of the motion as it is, by their limits; 0 without limits."""
-        return float((self.before.peaks / self.limits.sizes[:3]).max())
-
-    @property
-    def torque(self) -> float:
-        """The largest torque of the motion as it is, by its limit; 0 without limits."""
-        return float((self.before.ride.torque / self.limits.sizes[3]).max())
+    def own(self) -> Candidate:
+        """The motion as it is."""
+        of, ride = self.before.recording, self.before.ride
+        shares = (np.vstack([self.before.peaks, ride.torque]) / self.limits.sizes).max(axis=1)
+        return Candidate("as it is", of.times, of.values, None, ride, 0.0, float(shares[:3].max()), float(shares[3]))
 
     def write(self, output: AnyPath, *, force: bool = False) -> None:
         """Write the best motion as a JointTrajectory (`.json`), a table (`.csv`) or a bag of ROS 2 (`.rosbag2`).
@@ -85,18 +82,16 @@ class Smoothed:
         torques = [None] * len(self.robot.joints) if new.moments is None else new.moments.T
         joints = map(JointMotion, self.robot.joints, new.command.T, rates.T, torques)
         motion = JointMotions("smooth", new.times, tuple(joints), ())
-        write_content(path, make(motion), force=force)
+        write_content(path, make(motion)[0], force=force)
 
 
 BAG = ".rosbag2"  # a folder
-MAKERS: Mapping[str, Callable[[JointMotions], Content]] = {
-    ".json": lambda motion: joint_trajectory_text(motion)[0],
-    ".csv": csv_text,
-    BAG: lambda motion: joint_trajectory_bag(motion)[0],
-}
+MAKERS: Mapping[str, Callable[[JointMotions], Converted]] = {
+    ".json": joint_trajectory_text, ".csv": csv_text, BAG: joint_trajectory_bag
+}  # fmt: skip
 
 
-def maker_of(path: Path) -> Callable[[JointMotions], Content]:
+def maker_of(path: Path) -> Callable[[JointMotions], Converted]:
     """Return the writer for a motion file by its suffix. Raises `InputError` unless it is one of `MAKERS`."""
     if path.suffix not in MAKERS:
         raise InputError(f"{path}: expected a name that ends in {either(MAKERS)}", f'"{path.name}"')

@@ -201,4 +201,4 @@ def test_each_analysis_has_a_file_and_none_is_replaced(crank, ffrobot, tmp_path)
     done = ffrobot.ok("export", results, "--format", "csv", "--analysis", names[0], "--force")
     assert len(made[0].read_text().splitlines()) > 2
     motion = replace(robot_motion(results, names[0]), joints=(JointMotion("=cmd|' /C calc'!A0", *3 * (np.zeros(2),)),))
-    assert csv_text(replace(motion, time=np.zeros(2))).startswith("time,'=cmd|' /C calc'!A0.coordinate,")
+    assert csv_text(replace(motion, time=np.zeros(2)))[0].startswith("time,'=cmd|' /C calc'!A0.coordinate,")
