@@ -5,19 +5,18 @@ from copy import deepcopy
 
 import numpy as np
 import pytest
-from small_robots import BEAM, CANTILEVER, FORCE, FREE, RHO, RIGID, E, L, rows
+import small_robots
+from small_robots import BEAM, CANTILEVER, FORCE, FREE, RHO, E, L, rows
 
 import ffrobot as library
 from ffrobot import optimise, trade_off, uncertainty
 
 J = 0.05 + 2.0 * 0.3**2  # of the arm about its joint
-SHOULDER = {"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}
-ARM = {
-    "name": "arm",
+(SHOULDER,) = small_robots.ARM["joint"]
+ARM = small_robots.ARM | {
     "gravity": [0.0, 0.0],
-    "body": [{"name": "arm", "rigid": RIGID}],
     "joint": [SHOULDER | {"gear_ratio": 50.0, "rotor_inertia": 2e-5}],
-    "trajectory": [{"name": "swing", "joint": "shoulder", "value": "t**2"}],
+    "payload": [],
     "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.2, "output_step": 0.1}],
 }
 MOTOR = "peak joints.shoulder.motor_moment"

@@ -21,32 +21,30 @@ PLANE = SWING | {
 STILL = {"analysis": [{"name": "still", "kind": "static"}]}
 STEP = 2e-4  # s, of outputs that responses are read from, however far apart those of the scene are
 SPACE_LINK = TUBE | {"modes": {"count": 4, "family": ["in-plane-bending", "out-of-plane-bending"]}}
-SPACE = {
-    "name": "arm",
+SPACE = SWING | {
     "space": "spatial",
     "gravity": [0.0, 0.0, -9.81],
     "body": [{"name": "arm", "link": SPACE_LINK}],
-    "joint": [{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"], "axis": [0.3, 0.8, 0.5]}],
-    "payload": [{"point": "arm.tip", "mass": 0.5, "center": [0.02, 0.0, 0.01], "inertia": [1e-3, 2e-3, 2e-3]}],
-    "initial": {"state": "static"},
-    "trajectory": [{"name": "swing", "joint": "shoulder", "value": "pi/4*(1 - cos(pi*t))"}],
-    "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.2, "output_step": 0.005}],
+    "joint": [SWING["joint"][0] | {"axis": [0.3, 0.8, 0.5]}],
+    "payload": [SWING["payload"][0] | {"center": [0.02, 0.0, 0.01], "inertia": [1e-3, 2e-3, 2e-3]}],
+    "analysis": PLANE["analysis"],
 }
 
 
+def place(key):
+    """Of a key of the scene or of the link in it."""
+    first, *inner = key.split(".")
+    return ("body", inner[0], "link", *inner[1:]) if first == "links" else (first, *inner)
+
+
 def changed(scene, key, value):
-    """The scene with the value at a key of its own or of the link in it."""
     new = deepcopy(scene)
-    parts = key.split(".")
-    set_key(new, ("body", parts[1], "link", *parts[2:]) if parts[0] == "links" else tuple(parts), value)
+    set_key(new, place(key), value)
     return new
 
 
 def value_at(scene, key):
-    parts = key.split(".")
-    return (
-        value_of(scene["body"][0]["link"], tuple(parts[2:])) if parts[0] == "links" else value_of(scene, tuple(parts))
-    )
+    return value_of(scene, place(key))
 
 
 def by_hand(scene, key):
@@ -165,7 +163,7 @@ def test_moment_of_a_rigid_arm(write):
     rounding = 1e-10 * found.value[0] / np.array([0.5, 0.3, 0.05])  # of differences with a key 1e-5 of it larger
     assert np.all(np.abs(found.derivative[0] - expected) < rounding)
     np.testing.assert_array_equal(found.derivative[1], 0.0)
-    assert found.readings[0].time == 0.0
+    assert next(iter(found.readings.values())).time == 0.0
     assert found.value[0] == pytest.approx(2 * (0.05 + 0.18 + 0.18) + (0.6 + 0.3) * 9.81, rel=1e-9)
     assert found.value[1] == pytest.approx(2.0)
 
@@ -179,7 +177,7 @@ def test_a_kink_is_told(write):
     found = ffrobot.sensitivity(write(scene), ["peak joints.shoulder.moment"], ["gravity.1"])
     (entry,) = found.entries[0]
     assert any("a kink: with gravity.1 = " in note for note in entry.notes)
-    time = found.readings[0].time
+    time = next(iter(found.readings.values())).time
     J = 0.05 + 2.0 * 0.09 + 0.5 * 0.36
     assert found.value[0] == pytest.approx(0.01 * 16 * np.pi**2 * J * abs(np.sin(4 * np.pi * time)), rel=1e-9)
     sign = np.sign(np.sin(4 * np.pi * time))

@@ -27,20 +27,13 @@ def revolutions(speed):
     return np.asarray(speed) * 2 * np.pi / 60
 
 
-def test_turning_has_the_closed_form():
-    """a = −1/(2 K_s min Re G) = 2 k ζ (1 + ζ)/K_s (S. A. Tobias, Machine-Tool Vibration, 1965)."""
-    omega, G = ONE.response()
+@pytest.mark.parametrize(("zeta", "rel"), [(ZETA, 1e-4), (0.3, 2e-3), (1.0 + 1e-9, 2e-3), (4.0, 2e-3)])
+def test_turning_has_the_closed_form(zeta, rel):
+    """a = −1/(2 K_s min Re G) = 2 k ζ (1 + ζ)/K_s for any ζ (S. A. Tobias, Machine-Tool Vibration, 1965)."""
+    omega, G = Tip(ONE.K, np.array([[2 * zeta * OMEGA]]), ONE.J).response()
     limits = stability_limits(np.array([[-K_T]]), omega, G)
     assert limits.least == pytest.approx(-1.0 / (2 * K_T * G.real.min()), rel=1e-12)
-    assert limits.least == pytest.approx(2 * MASS * OMEGA**2 * ZETA * (1 + ZETA) / K_T, rel=1e-4)
-
-
-@pytest.mark.parametrize("zeta", [0.3, 1.0 + 1e-9, 4.0])
-def test_turning_with_strong_damping_has_a_limit(zeta):
-    """a = 2 k ζ (1 + ζ)/K_s for any ζ."""
-    tip = Tip(ONE.K, np.array([[2 * zeta * OMEGA]]), ONE.J)
-    limits = stability_limits(np.array([[-K_T]]), *tip.response())
-    assert limits.least == pytest.approx(2 * MASS * OMEGA**2 * zeta * (1 + zeta) / K_T, rel=2e-3)
+    assert limits.least == pytest.approx(2 * MASS * OMEGA**2 * zeta * (1 + zeta) / K_T, rel=rel)
 
 
 def test_lobes_of_turning_have_the_closed_form():
