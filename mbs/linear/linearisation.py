@@ -60,10 +60,6 @@ class LinearMechanism:
         J = self.points[point]
         return self.tool_axes[point] @ J if point in self.tool_axes else J
 
-    def modal(self, body: str) -> list[int]:
-        """Indices in s of the modal coordinates of a body."""
-        return [i for i, name in enumerate(self.names) if name.startswith(f"modal/{body}/")]
-
 
 class LinearEquations:
     """Equations of motion, SI units, that `at` makes linear in independent coordinates s about any posture.

@@ -384,18 +384,10 @@ class _Reduction:
             raise AcrossError
         (x_a, y_a, _), (x_b, y_b, _) = a @ row.g, b @ row.g
         turned = float(np.arctan2(x_a * y_b - y_a * x_b, x_a * x_b + y_a * y_b))
+        if abs(turned) > EXACT:  # no markers of their own for that: it is rare, and right in space
+            raise AcrossError
         flat.kind, flat.f = _core.ConstraintKind.rotation, np.array([0.0, 0.0, np.sign(f[2])])
-        if abs(turned) > EXACT:
-            if row.a.body >= 0:
-                raise AcrossError
-            marker = planar_marker(self._parts.ground[row.a.marker], self._ground)
-            marker.angle -= turned
-            flat.a = self._added(marker)
         return flat
-
-    def _added(self, marker: _core.PlanarMarker) -> _core.MarkerAt:
-        self._shifted.append(marker)
-        return _core.MarkerAt(-1, len(self._parts.ground) + len(self._shifted) - 1)
 
     def _shifted_for(self, row: _core.ConstraintModel, f: Array) -> _core.MarkerAt:
         """A point of the ground from which f in the plane measures what it does in space: d_n is a constant."""
@@ -407,7 +399,8 @@ class _Reduction:
         marker = _core.PlanarMarker()
         marker.position = a[:2] - f[:2] * (f[2] * (height - a[2]) / (f[:2] @ f[:2]))
         marker.Phi = np.zeros((3, 0))
-        return self._added(marker)
+        self._shifted.append(marker)
+        return _core.MarkerAt(-1, len(self._parts.ground) + len(self._shifted) - 1)
 
     def _marker(self, at: _core.MarkerAt) -> _core.SpatialMarker:
         return (self._parts.ground if at.body < 0 else self._parts.bodies[at.body].data.markers)[at.marker]

@@ -33,8 +33,6 @@ def with_fewer_modes(body: Body, lowest: int, loaded: Sequence[str]) -> Body:
     found apart for modes that no load couples: they keep to the plane of bending, or to torsion.
     """
     lowest = min(lowest, body.n_eigenmodes)
-    if lowest >= body.n_modes:
-        return body
     kept = np.sort(np.argsort(body.stiffness[: body.n_eigenmodes], kind="stable")[:lowest])
     B_T = interface_loads(body, loaded)
     shapes: list[Array] = [np.zeros((body.n_modes, 0))]

@@ -1,5 +1,7 @@
 """Mechanisms in 3D that move in a plane: the recursion in the plane is the recursion in 3D."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from checkpoint_scenes import motor_on_frames, tree_model
@@ -97,7 +99,7 @@ def test_trees_under_all_that_acts(seed, rotor):
         trajectory=followed,
     )  # fmt: skip
     push = Drive(rng.standard_normal(model.tree.n_v), WAVE)
-    system = MultibodySystem(model, motor_on_frames(model, 0, WAVE)._replace(along=(push,)))
+    system = MultibodySystem(replace(model, modal_loads=(push,)), motor_on_frames(model, 0, WAVE))
     assert list(system.integrated.rows) == [0, 1]
     assert_same(system, states(rng, model.tree))
 
