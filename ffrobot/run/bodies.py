@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -68,6 +68,11 @@ class LoadedBody:
         moving = self.spatial.modal_transform.any(axis=1)
         kept = {family for family, moves in zip(self.modal.family, moving, strict=True) if moves}
         return tuple(one for one in self.motions if one in self.modal.family and one not in kept)
+
+
+def links_of(bodies: Mapping[str, LoadedBody]) -> dict[str, ModalBody]:
+    """Modal bodies of those that are flexible, by name."""
+    return {name: body.modal for name, body in bodies.items() if body.modal is not None}
 
 
 P = TypeVar("P", Payload, Tool)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import product
 
 import numpy as np
 
@@ -32,16 +33,14 @@ MOST = 64  # pieces of a link
 
 def links_in_pieces(prepared: Prepared) -> dict[str, LinkInPieces]:
     """The links in pieces of a scene, by name."""
-    links = {}
+    links, own = {}, prepared.solved_links
     for name, body in prepared.divided.items():
-        modal, whole = prepared.bodies[name].modal, prepared.bodies[name].spatial
-        pieces = (prepared.parts[piece].modal for piece in body.names)
-        assert modal is not None
+        whole = prepared.bodies[name].spatial
         links[name] = LinkInPieces(
-            modal=modal,
+            modal=prepared.links[name],
             names=body.names,
             starts=body.cut.starts,
-            pieces=tuple(piece for piece in pieces if piece is not None),
+            pieces=tuple(own[piece] for piece in body.names),
             places={label: body.point(label) for label in body.cut.places},
             points=whole.points,
             to_own=np.linalg.pinv(whole.modal_transform).T,
@@ -55,17 +54,14 @@ def wanted_pieces(prepared: Prepared, runs: Sequence[Run]) -> dict[str, int]:
     What a piece loses of its length goes down with the square of their number. A run that failed has bent links
     farther than they are.
     """
-    wanted, now = {}, {}
+    wanted, now, links = {}, {}, prepared.solved_links
     for body in prepared.scene.body:
         if body.pieces == "auto":
             names = prepared.divided[body.name].names if body.name in prepared.divided else (body.name,)
             worst = 0.0  # shortening, of the length
-            for name in names:
-                modal = (prepared.parts or prepared.bodies)[name].modal
-                assert modal is not None
-                for run in runs:
-                    shortening = shape_from_chord(modal, modal_coordinates(run, name))[2].max(initial=0.0)
-                    worst = max(worst, float(shortening) / modal.length)
+            for name, run in product(names, runs):
+                shortening = shape_from_chord(links[name], modal_coordinates(run, name))[2].max(initial=0.0)
+                worst = max(worst, float(shortening) / links[name].length)
             count = enough_pieces(worst, len(names)) if worst > ENOUGH else 1
             wanted[body.name], now[body.name] = max(min(MOST, count), len(names)), len(names)
     return {} if wanted == now else wanted
@@ -76,11 +72,10 @@ def bending_of_links(prepared: Prepared, run: Run) -> dict[str, Bending]:
 
     In motion with the largest errors of any link for all: errors of one link move and load all others.
     """
-    bodies, divided = prepared.parts or prepared.bodies, prepared.divided
-    links = {name: body.modal for name, body in bodies.items() if body.modal is not None}
+    divided = prepared.divided
     link_of = {piece: name for name, body in divided.items() for piece in body.names}
     worst: dict[str, Bending] = {}
-    for piece, bent in link_bending(run, links).items():
+    for piece, bent in link_bending(run, prepared.solved_links).items():
         name = link_of.get(piece, piece)
         if name not in worst or bent.missing.of_length > worst[name].missing.of_length:
             worst[name] = bent
@@ -98,9 +93,8 @@ def bending_of_links(prepared: Prepared, run: Run) -> dict[str, Bending]:
 
 def _missing(prepared: Prepared, run: Run, name: str) -> Missing:
     """What the pieces of a link miss, which have geometric stiffening; in motion it makes the link vibrate besides."""
-    link, names = prepared.bodies[name].modal, prepared.divided[name].names
-    assert link is not None
-    pieces = {piece: modal for piece in names if (modal := prepared.parts[piece].modal) is not None}
+    link, own = prepared.links[name], prepared.solved_links
+    pieces = {piece: own[piece] for piece in prepared.divided[name].names}
     of_length = float(np.linalg.norm(missed_by_pieces(run, pieces), axis=1).max(initial=0.0)) / link.length
     of_length *= 1.0 if run.is_at_rest else IN_MOTION
     whole = largest_displacement(link, modal_coordinates(run, name))

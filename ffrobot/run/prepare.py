@@ -18,7 +18,7 @@ from ..scene.load import load_scene
 from ..scene.pieces import BodyInPieces, bodies_in_pieces, scene_of_pieces
 from ..scene.scene import Scene
 from .actuation import given_voltages, make_patches, points_3d
-from .bodies import LoadedBody, load_bodies, with_structure
+from .bodies import LoadedBody, links_of, load_bodies, with_structure
 from .mode_search import mode_levels
 from .result import Solution
 from .watcher import Watcher
@@ -91,12 +91,10 @@ def with_pieces(solution: Solution, counts: Mapping[str, int], watcher: Watcher)
     for name in divided.keys() & patches.keys():
         from ..actuation.patches.link_patches import on_pieces
 
-        link, names, starts = solution.bodies[name].modal, divided[name].names, divided[name].cut.starts
-        assert link is not None
-        at = zip(names, starts, strict=True)
-        pieces = {piece: (start, modal) for piece, start in at if (modal := parts[piece].modal) is not None}
-        patches[name] = on_pieces(solution.scene.path, patches[name], link, pieces)
-        for piece, start in zip(names, starts, strict=True):
+        links, starts = links_of(parts), dict(zip(divided[name].names, divided[name].cut.starts, strict=True))
+        pieces = {piece: (start, links[piece]) for piece, start in starts.items()}
+        patches[name] = on_pieces(solution.scene.path, patches[name], solution.links[name], pieces)
+        for piece, start in starts.items():
             on_piece = [one for _, one in patches[name].placed_on(start, parts[piece].spatial.length or 0.0)]
             parts[piece] = with_structure(parts[piece], on_piece)
     return unsolved(replace(solution, divided=divided, parts=parts, patches=patches))

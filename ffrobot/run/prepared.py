@@ -17,7 +17,7 @@ from ..mbs.model.projection import vanishing_in_plane
 from ..mbs.model.truncation import modes_kept
 from ..scene.pieces import BodyInPieces
 from ..scene.scene import Scene
-from .bodies import LoadedBody
+from .bodies import LoadedBody, links_of
 
 if TYPE_CHECKING:  # most scenes have none of these
     from ..actuation.patches.link_patches import LinkPatches
@@ -60,7 +60,12 @@ class Prepared:
     @property
     def links(self) -> dict[str, ModalBody]:
         """The modal bodies of the flexible bodies, as their files have them."""
-        return {name: body.modal for name, body in self.bodies.items() if body.modal is not None}
+        return links_of(self.bodies)
+
+    @property
+    def solved_links(self) -> dict[str, ModalBody]:
+        """Likewise of the bodies in the equations: pieces in place of their links."""
+        return links_of(self.parts or self.bodies)
 
     @property
     def is_stiffened(self) -> bool:

@@ -23,7 +23,7 @@ from ..mbs.quantities.stress import (
 )
 from ..mbs.run.record import Run
 from ..scene.pieces import BodyInPieces
-from .bodies import LoadedBody
+from .bodies import LoadedBody, links_of
 
 if TYPE_CHECKING:
     from ..actuation.patches.link_patches import LinkPatches
@@ -39,8 +39,7 @@ def find_stresses(
     elsewhere than at interfaces, and of those that patches stiffen otherwise than by bending in the plane, and pieces
     of these, as static stresses of files are those of the bare link.
     """
-    modal = {name: body.modal for name, body in bodies.items() if body.modal is not None}
-    links = {name: link for name, link in modal.items() if link.stress or link.surface_stress is not None}
+    links = {name: link for name, link in links_of(bodies).items() if link.stress or link.surface_stress is not None}
     stiff = {name: of for name, of in patches.items() if any(one.layout.adds_stiffness for one in of.arrays.values())}
     unknown = {name for name in stiff.keys() & links.keys() if _in_plane(stiff[name], bodies[name].spatial) is None}
     unknown |= {piece for name in stiff.keys() & divided.keys() for piece in divided[name].names}
