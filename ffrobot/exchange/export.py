@@ -34,6 +34,7 @@ from .motion import (
 )
 from .urdf.export_urdf import scene_as_urdf
 from .urdf.import_urdf import Imported
+from .urdf.shape_masses import MASSES
 
 Content = str | bytes | Mapping[str, bytes]
 """Of a file, or the files of a folder by name."""
@@ -200,14 +201,8 @@ def print_import(imported: Imported, console: Console) -> None:
     headers = "joint", "type", "range", "moment or force", "speed", "damping", "friction"
     console.print(plain_table(headers, rows))
     if imported.masses:
-        rows = []
-        for each in imported.masses:
-            ratios = f"{each.density:.4g}", f"{each.inertia_ratio:.3g}", f"{each.center_distance:.2g}"
-            kind, of_shape = "closed" if each.is_closed else "open", ratios if each.volume else ("–", "–", "–")
-            rows.append((each.link, kind, f"{each.mass:.4g}", f"{each.volume:.3g}", *of_shape))
-        headers = "link", "mesh", "mass kg", "volume m³", "implied kg/m³", "inertia: mesh / URDF", "centers apart m"
         console.print()
-        console.print(plain_table(headers, rows))
+        console.print(plain_table(MASSES, imported.masses))
         console.out(
             "note       meshes are skins: a filled one has the stiffness of no real casting; links are rigid unless"
             " --flexible names a file",

@@ -69,17 +69,13 @@ class JointMotions:
 
 
 def robot_motion(path: Path, analysis: str | None, side: Side = "motor") -> JointMotions:
-    """Read joint motions from the results file at `path`; default: the first analysis with moving joints.
-
-    Raises:
-        InputError: there is no such analysis, or none of its joints moves.
-    """
-    with Results(path) as results:
+    """Read joint motions from the results file at `path`; default: the first analysis with moving joints."""
+    with naming(path), Results(path) as results:
         known = [name for name in results.analyses if any(_moving(results, name))]
         if analysis is not None:
-            check_known(analysis, names := results.analyses, f"{path}: --analysis: expected one of {quoted(names)}")
+            check_known(analysis, names := results.analyses, f"--analysis: expected one of {quoted(names)}")
         if not known or analysis not in (None, *known):
-            raise InputError(f"{path}: expected an analysis with joints that move", f"none in {analysis or 'it'}")
+            raise InputError("expected an analysis with joints that move", f"none in {analysis or 'it'}")
         name = analysis or known[0]
         joints = tuple(part for joint in _moving(results, name) for part in _parts(results, name, joint))
         time, status = results.time(name), results.attributes(name)["status"]
@@ -170,11 +166,7 @@ VERSION = 8  # of the metadata: what ROS 2 Iron and later write, and Humble read
 
 
 def joint_trajectory_bag(motion: JointMotions) -> tuple[Mapping[str, bytes], tuple[str, ...]]:
-    """Return files of a ROS 2 bag by name, SQLite storage, with the message at time zero; and remarks.
-
-    Raises:
-        SolveError: `rosbags` is not installed.
-    """
+    """Return files of a ROS 2 bag by name, SQLite storage, with the message at time zero; and remarks."""
     with extras():
         from rosbags.rosbag2 import Writer
         from rosbags.typesys import Stores, get_typestore

@@ -28,9 +28,6 @@ def draft_link(part: Inspection, file: Path, name: str, folder: Path, density: f
     These are two bores across the part, else its plane ends. All other plane faces and bores are there as comments.
     Concentrated masses of a file in m are on the nearest of all these faces. The material is aluminum, or the one of
     the `density` (kg/m³) that is given; a comment says whose stiffness it has.
-
-    Raises:
-        InputError: the part has no two such faces.
     """
     root, tip = _ends(part)
     axes, length = _frame(part, root, tip)

@@ -219,11 +219,7 @@ def note(body: ModalBody, numbers: Mapping[str, int]) -> str:
 
 
 def _noted(text: str, nodes: Nodes) -> tuple[str | None, dict[str, int]]:
-    """Reference condition and number of each interface from a `note` in `text`; None and {} without one.
-
-    Raises:
-        InputError: they are no numbers of `nodes`.
-    """
+    """Reference condition and number of each interface from a `note` in `text`; None and {} without one."""
     match = re.search(r"ffrobot: ([\w-]+); (.*)", text)
     if match is None:
         return None, {}
@@ -257,11 +253,7 @@ NOT_IN_THE_FILE = (
 
 
 def modal_body(name: str, integrals: ShapeIntegrals, nodes: Nodes, text: str) -> tuple[ModalBody, tuple[str, ...]]:
-    """The body of foreign integrals and nodes, with modes of unit mass, and remarks; `text` may have a `note`.
-
-    Raises:
-        InputError: a mode has no stiffness, or the integrals cannot be those of a body.
-    """
+    """The body of foreign integrals and nodes, with modes of unit mass, and remarks; `text` may have a `note`."""
     condition, numbers = _noted(text, nodes)
     integrals, remarks = _with_agreed_masses(integrals)
     T, omega2 = _orthonormal(integrals)

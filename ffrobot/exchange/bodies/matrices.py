@@ -74,9 +74,6 @@ def craig_bampton_file(body: ModalBody) -> tuple[bytes, tuple[str, ...]]:
     """An .npz file with M, K, C (m, m) by the m `coordinates` (m, rad), SI units, and remarks.
 
     `origins` (i, 3), m, are where the `interfaces` are, `recovery` (3 k, m) are displacements of `points` (k, 3), m.
-
-    Raises:
-        InputError: the body has other modes, or its interfaces do not move in all six components.
     """
     if body.reference_condition != CONDITION:
         raise InputError(

@@ -75,11 +75,7 @@ def _lines(rows: Iterable[Iterable[float]]) -> Iterator[str]:
 
 
 def read_fem(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
-    """The body in the text of a .fem file, and remarks on it.
-
-    Raises:
-        InputError: it is no such file, records are missing or have other sizes, or it cannot be a body.
-    """
+    """The body in the text of a .fem file, and remarks on it."""
     records = _records(text)
     labels = [int(value) for value in _numbers(records, 2)]
     count = len(labels)

@@ -75,11 +75,7 @@ def _integral_lines(integrals: ShapeIntegrals) -> Iterator[str]:
 
 
 def read_sid(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
-    """The body in the text of a SID_FEM file, and remarks on it.
-
-    Raises:
-        InputError: it is no such file, or what it holds cannot be a body.
-    """
+    """The body in the text of a SID_FEM file, and remarks on it."""
     head, top = _parse(text)
     part = top["part"]
     modal = Modal(next((one for one in part.inside if one.name == "modal"), None) or part["modal"])

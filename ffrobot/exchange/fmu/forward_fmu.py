@@ -47,16 +47,11 @@ LIBRARY = "ffrobot_fmu.so"  # beside the core (CMakeLists.txt)
 
 
 def forward_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str, ...], str]:
-    """The FMU of an analysis of kind "forward", the first if not named; a few words on it, remarks, its name.
-
-    Raises:
-        InputError: there is no such analysis, or something acts that the FMU does not have.
-        SolveError: the scene has no state to start from.
-    """
+    """The FMU of an analysis of kind "forward", the first if not named; a few words on it, remarks, its name."""
     scene = load_scene(path)
-    chosen = _chosen(path, scene, analysis)
-    _check(path, scene)
     with naming(path):
+        chosen = _chosen(scene, analysis)
+        _check(scene)
         folder, suffix = platform_here()
     prepared = prepare_scene(scene, _Logged())
     bodies = mode_levels(scene, prepared.bodies)[-1]  # "auto": all of them
@@ -78,34 +73,33 @@ class _Logged(Watcher):
         logger.info("%s", title)
 
 
-def _chosen(path: Path, scene: Scene, name: str | None) -> Forward:
+def _chosen(scene: Scene, name: str | None) -> Forward:
     analyses = {each.name: each for each in scene.analysis}
     if name is not None:
-        check_known(name, analyses, f"{path}: --analysis: expected one of {quoted(analyses)}")
+        check_known(name, analyses, f"--analysis: expected one of {quoted(analyses)}")
     fitting = (each for each in scene.analysis if isinstance(each, Forward) and each.actuation is None)
     if (chosen := next((each for each in fitting if name in (None, each.name)), None)) is not None:
         return chosen
     wanted = 'an analysis of kind "forward" without actuation, whose motors are the inputs of the FMU'
     if name is None:
-        raise InputError(f"{path}: --analysis: expected {wanted}", "none")
+        raise InputError(f"--analysis: expected {wanted}", "none")
     kind = getattr(analyses[name], "kind", "?")
     what = f'kind "{kind}"' + (" with actuation" if isinstance(analyses[name], Forward) else "")
-    raise InputError(f"{path}: --analysis: expected {wanted}", f'"{name}" of {what}')
+    raise InputError(f"--analysis: expected {wanted}", f'"{name}" of {what}')
 
 
-def _check(path: Path, scene: Scene) -> None:
+def _check(scene: Scene) -> None:
+    of = "of a scene for an FMU"
     if scene.load:
-        raise InputError(f"{path}: load: expected none of a scene for an FMU, whose loads are its inputs", "some")
+        raise InputError(f"load: expected none {of}, whose loads are its inputs", "some")
     for body in scene.body:
         if body.pieces is not None:
-            raise InputError(f'{path}: body "{body.name}": pieces: expected none of a scene for an FMU', body.pieces)
+            raise InputError(f'body "{body.name}": pieces: expected none {of}', body.pieces)
     if scene.geometric_stiffening == "auto":
-        raise InputError(
-            f"{path}: geometric_stiffening: expected true or false of a scene for an FMU",
-            '"auto", by which the motion of an analysis decides',
-        )
+        auto = '"auto", by which the motion of an analysis decides'
+        raise InputError(f"geometric_stiffening: expected true or false {of}", auto)
     if scene.motors == "frame":
-        raise InputError(f'{path}: motors: expected "section" of a scene for an FMU', '"frame"')
+        raise InputError(f'motors: expected "section" {of}', '"frame"')
 
 
 COMPONENTS = ("xx", "yy", "zz", "yz", "xz", "xy")  # the last three are 2 ε, as in modal body files

@@ -51,11 +51,7 @@ class Unit:
 
 
 def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str, ...], str]:
-    """The FMU of an analysis with linear models, the first if not named; a few words on it, remarks, its name.
-
-    Raises:
-        InputError: there is no such analysis, it has several times, or its model has no inputs or is not finite.
-    """
+    """The FMU of an analysis with linear models, the first if not named; a few words on it, remarks, its name."""
     unit, models, remarks, name = _unit(path, analysis)
     if len(models) > 1:
         remarks.append(f"the controllers at {models[0].time:g} s; --format c has all of their schedule")

@@ -114,11 +114,7 @@ def _of_keys(tree: KinematicTree, size: float) -> Iterator[str]:
 
 
 def scene_as_urdf(path: Path) -> tuple[str, str, tuple[str, ...]]:
-    """Return the text of the URDF, a summary, and remarks on what it cannot hold.
-
-    Raises:
-        InputError: the scene is wrong, or planar.
-    """
+    """Return the text of the URDF, a summary, and remarks on what it cannot hold."""
     scene = load_robot(path)
     if scene.is_planar:
         raise InputError(

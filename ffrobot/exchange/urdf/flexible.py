@@ -35,16 +35,13 @@ class ImportedLink:
     file_name: str  # of the link file beside the scene
     place: Place  # of the URDF's link frame in the axes of the link file
     keys: Mapping[str, Any]  # of the link file
+    table: LinkTable  # the same, before there is a folder for it
     point_of: Mapping[str, str]  # by the name of each joint beyond, the interface that it is on
     remarks: tuple[str, ...]  # on what was taken from where
 
 
 def flexible_link(robot: Robot, name: str, source: Path, folder: Path, stem: str) -> ImportedLink:
-    """The link `name` from the link file at `source`, for a scene in `folder`, where its file is `stem`.toml.
-
-    Raises:
-        InputError: there is no such link or file, a joint is off the axis of a beam, the file has another length.
-    """
+    """The link `name` from the link file at `source`, for a scene in `folder`, where its file is `stem`.toml."""
     if name not in robot.links:
         known = did_you_mean(name, robot.links)
         raise InputError(f"--flexible {shown(name)}: expected a link of the URDF", f"none of this name{known}")
@@ -69,10 +66,11 @@ def flexible_link(robot: Robot, name: str, source: Path, folder: Path, stem: str
     if part is not None:
         remarks += _in_bores(keys, part, _axes_of_joints(robot, name, point_of, place), length)
     file_name = f"{stem}.toml"
-    read_link(LinkTable(keys, folder / file_name))
-    if part is not None:  # only now: the check above cannot go up from a folder that is not there yet
+    table = LinkTable(keys | {"geometry": dict(geometry)}, folder / file_name)
+    read_link(table)
+    if part is not None:
         geometry["file"] = os.path.relpath(part, folder.resolve())
-    return ImportedLink(name, file_name, place, keys, point_of, tuple(remarks))
+    return ImportedLink(name, file_name, place, keys, table, point_of, tuple(remarks))
 
 
 def _axes(robot: Robot, name: str, tip: UrdfJoint | None) -> Array:

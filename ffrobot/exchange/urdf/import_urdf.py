@@ -13,30 +13,23 @@ from ...common.structs import struct
 from ...common.tables import beyond_limits, shown
 from ...common.toml_files import toml_text
 from ...fe_models.link import cached_modal_body
-from ...fe_models.link_source import LinkTable
 from ...mbs.model.body import from_modal_body
 from .flexible import ImportedLink, flexible_link
 from .robot import MASSLESS, Inertial, MeshFile, Names, Robot, inertial_of, read_urdf
 from .scene import SceneOfRobot, is_possible
-from .shape_masses import Filling, MeshMass, mesh_masses, mesh_path, with_masses, without_mass
+from .shape_masses import Filling, mesh_masses, mesh_path, with_masses, without_mass
 
 SAME = 1e-9  # relative: less is round-off
 
 
-def _in_place_of(
-    robot: Robot, link: ImportedLink, folder: Path, *, keep_rest: bool
-) -> tuple[dict[str, Any] | None, list[str]]:
+def _in_place_of(robot: Robot, link: ImportedLink, *, keep_rest: bool) -> tuple[dict[str, Any] | None, list[str]]:
     """Payload that makes up for the difference to the <inertial> of the URDF, where it is to be kept; and remarks.
 
     Its `point` is without its body. It is what the URDF has beyond the flexible link: mass m − m', first moment
     mc − m'c', and the inertia about the frame less that of the link, taken to the center of the rest; axes of the link
     file.
     """
-    geometry = dict(link.keys["geometry"])
-    if isinstance(file := geometry.get("file"), str):
-        geometry["file"] = str((folder / file).resolve())  # the folder need not be there yet
-    table = LinkTable({**link.keys, "geometry": geometry}, folder / link.file_name)
-    body = from_modal_body(link.name, cached_modal_body(table).body)
+    body = from_modal_body(link.name, cached_modal_body(link.table).body)
     inertial = robot.links[link.name].inertial
     before = MASSLESS if inertial is None else inertial.seen_from(link.place)
     after, label = inertial_of(body, np.zeros(3)), f'link "{shown(link.name)}"'
@@ -137,7 +130,7 @@ class Imported:
     robot: Robot  # as read
     scene: Mapping[str, Any]  # keys of the scene file
     remarks: tuple[str, ...]  # on what is left out, renamed or odd, a line each
-    masses: tuple[MeshMass, ...]  # what meshes say
+    masses: list[tuple[str, ...]]  # what meshes say: cells of `MASSES`
     files: tuple[Path, ...]  # all that were written
 
 
@@ -184,7 +177,7 @@ def import_urdf(
         for link in links.values():
             about = f'link "{link.name}" is flexible: {link.file_name} determines its inertia, not its <inertial>'
             remarks += [about, *(f"{link.file_name}: {remark}" for remark in link.remarks)]
-        payloads, about_rest = _compared(robot, links, folder, scene, keep_rest=keep_rest)
+        payloads, about_rest = _compared(robot, links, scene, keep_rest=keep_rest)
         keys = {**scene.keys, **({"payload": payloads} if payloads else {})}
         remarks += [*about_rest, *about_meshes, *_remarks_on_scale(robot)]
         files = {SCENE: _scene_text(urdf, keys, remarks)}
@@ -193,16 +186,16 @@ def import_urdf(
             head = _comment(f'Link "{link.name}" of {urdf.name}: {axes}.')
             files[link.file_name] = f"{head}\n\n{toml_text(link.keys)}"
         written = _write(folder, files, force=force)
-        return Imported(robot, keys, tuple(remarks), tuple(masses), written)
+        return Imported(robot, keys, tuple(remarks), masses, written)
 
 
 def _compared(
-    robot: Robot, links: Mapping[str, ImportedLink], folder: Path, scene: SceneOfRobot, *, keep_rest: bool
+    robot: Robot, links: Mapping[str, ImportedLink], scene: SceneOfRobot, *, keep_rest: bool
 ) -> tuple[list[dict[str, Any]], list[str]]:
     payloads, remarks = [], list[str]()
     for link in links.values():
         try:
-            payload, about = _in_place_of(robot, link, folder, keep_rest=keep_rest)
+            payload, about = _in_place_of(robot, link, keep_rest=keep_rest)
         except FfrobotError as error:
             if keep_rest:
                 raise

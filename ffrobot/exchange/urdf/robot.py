@@ -255,7 +255,7 @@ def read_urdf(path: Path) -> Robot:
         by_name = {joint.name: joint for joint in joints}
         _check_mimics(by_name)
         base = _root_of([link.name for link in links], joints)
-        odd = (*_turned(root), *_repeated(root), *_not_read(root))
+        odd = (*_odd(root), *_not_read(root))
         return Robot(root.get("name", "").strip() or base, {link.name: link for link in links}, by_name, base, odd)
 
 
@@ -287,19 +287,17 @@ def _root_element(content: bytes) -> Element:
     return root
 
 
-def _turned(root: Element) -> Iterable[str]:
-    """Remarks on angles of more than a turn, which are degrees as a rule."""
+def _odd(root: Element) -> Iterable[str]:
+    """Remarks on angles of more than a turn, degrees as a rule, and on elements that count once but are there twice.
+
+    Of these urdfdom takes the first, too.
+    """
     for each in (*root.findall("link"), *root.findall("joint")):
         turned = each.find("inertial") if each.tag == "link" else each
         rpy = (0.0, 0.0, 0.0) if turned is None else _origin(turned, each.tag).rpy
         if max(map(abs, rpy)) > 2 * math.pi:
             angles = " ".join(f"{angle:g}" for angle in rpy)
             yield f"{_label(each)}: rpy {angles} is more than a turn: URDF has rad, not degrees"
-
-
-def _repeated(root: Element) -> Iterable[str]:
-    """Remarks on elements that count once and stand there several times: urdfdom takes the first, too."""
-    for each in (*root.findall("link"), *root.findall("joint")):
         for part in (each, *each.findall("inertial")):
             inside = "" if part is each else " in <inertial>"
             for tag, count in Counter(child.tag for child in part if child.tag in ONCE).items():

@@ -26,12 +26,6 @@ class MergedLinks:
     members: dict[str, Place] = field(default_factory=dict)  # links, and where they stand in the body's axes
     inertial: Inertial = MASSLESS  # of all of them
 
-    def add(self, robot: Robot, link: str, place: Place) -> None:
-        """Merge a link into the body, in whose axes it stands at `place`."""
-        self.members[link] = place
-        if (inertial := robot.links[link].inertial) is not None:
-            self.inertial = self.inertial + inertial.seen_from(place)
-
     @property
     def weighs(self) -> bool:
         """Whether it has mass."""
@@ -53,24 +47,45 @@ def _mechanism(
     """
     ground = MergedLinks(robot.root, stands_still=True)
     bodies, joints, body_of = [ground], list[UrdfJoint](), dict[str, MergedLinks]()
+
+    def add(body: MergedLinks, link: str, place: Place) -> None:
+        body.members[link], body_of[link] = place, body
+        if (inertial := robot.links[link].inertial) is not None:
+            body.inertial = body.inertial + inertial.seen_from(place)
+
+    def carry(joint: UrdfJoint) -> None:
+        joints.append(joint)
+        bodies.append(MergedLinks(joint.child, flexible=joint.child in flexible))
+        add(bodies[-1], joint.child, flexible.get(joint.child, HERE))
+
     if robot.root in flexible:
         ground.members[""], body_of[""] = HERE, ground  # no link has this name
-        joints.append(UrdfJoint(f"{robot.root}_fixed", "fixed", "", robot.root))
-        bodies.append(_start(robot, robot.root, flexible, body_of))
+        carry(UrdfJoint(f"{robot.root}_fixed", "fixed", "", robot.root))
     else:
-        ground.add(robot, robot.root, HERE)
-        body_of[robot.root] = ground
+        add(ground, robot.root, HERE)
     outward = robot.joints_of(robot.root)
     for joint in outward:  # which grows
         outward += robot.joints_of(joint.child)
         parent = body_of[joint.parent]
         if joint.type == "fixed" and not parent.flexible and joint.child not in flexible:
-            parent.add(robot, joint.child, parent.members[joint.parent] @ joint.origin.place)
-            body_of[joint.child] = parent
+            add(parent, joint.child, parent.members[joint.parent] @ joint.origin.place)
         else:
-            joints.append(joint)
-            bodies.append(_start(robot, joint.child, flexible, body_of))
-    kept, carried, remarks = _with_mass(bodies, joints, body_of)
+            carry(joint)
+    kept, carried, remarks = _with_mass(robot, bodies, joints, body_of)
+    remarks += _fixed(kept) if fix_inertia else []
+    refuse(_wrong_inertias(kept))
+    return kept, carried, body_of, remarks
+
+
+def _with_mass(
+    robot: Robot, bodies: list[MergedLinks], joints: list[UrdfJoint], body_of: Mapping[str, MergedLinks]
+) -> tuple[list[MergedLinks], list[UrdfJoint], list[str]]:
+    """Without bodies beyond which nothing has mass: frames of tools and sensors on joints of their own."""
+    below = {body for body in bodies if body.weighs}
+    for joint in reversed(joints):
+        if body_of[joint.child] in below:
+            below.add(body_of[joint.parent])
+    kept = [body for body in bodies if not body.stands_still and body in below]
     if not kept:
         if any(link.inertial is not None and link.inertial.mass > 0 for link in robot.links.values()):
             raise InputError(f'expected a link with mass that moves on "{shown(robot.root)}"', "none")
@@ -79,27 +94,6 @@ def _mechanism(
             "no <inertial> with one in the whole file: it was made for viewers. Add <inertial> to its links, from CAD"
             " or a data sheet, take a description of the robot for dynamics, or estimate masses by --density",
         )
-    remarks += _fixed(kept) if fix_inertia else []
-    refuse(_wrong_inertias(kept))
-    return kept, carried, body_of, remarks
-
-
-def _start(robot: Robot, link: str, flexible: Mapping[str, Place], body_of: dict[str, MergedLinks]) -> MergedLinks:
-    body = MergedLinks(link, flexible=link in flexible)
-    body.add(robot, link, flexible.get(link, HERE))
-    body_of[link] = body
-    return body
-
-
-def _with_mass(
-    bodies: list[MergedLinks], joints: list[UrdfJoint], body_of: Mapping[str, MergedLinks]
-) -> tuple[list[MergedLinks], list[UrdfJoint], list[str]]:
-    """Without bodies beyond which nothing has mass: frames of tools and sensors on joints of their own."""
-    below = {body for body in bodies if body.weighs}
-    for joint in reversed(joints):
-        if body_of[joint.child] in below:
-            below.add(body_of[joint.parent])
-    kept = [body for body in bodies if not body.stands_still and body in below]
     refuse(
         f"{body.label}: expected a mass of a body that moves and carries others, found none: give it an <inertial>,"
         " make the joint that carries it fixed, or estimate masses by --density"

@@ -30,26 +30,17 @@ logger = logging.getLogger(__name__)
 NOT_LOOKED_AT = "meshes were not read, which needs trimesh: pip install trimesh pycollada"
 
 
-@struct
-class MeshMass:
-    """Comparison of the mesh of a link with its <inertial>; SI units."""
-
-    link: str
-    mass: float  # of <inertial>, kg
-    volume: float  # m³
-    density: float  # that gives this mass, kg/m³
-    inertia_ratio: float  # trace of the filled mesh's inertia about its center over that of <inertial>
-    center_distance: float  # of the two centers, m
-    is_closed: bool  # whether the mesh encloses a volume at all
+MASSES = "link", "mesh", "mass kg", "volume m³", "implied kg/m³", "inertia: mesh / URDF", "centers apart m"
+"""What tables compare of filled meshes and <inertial>; inertia: traces about the centers; implied: density."""
 
 
-def mesh_masses(robot: Robot, urdf: Path) -> tuple[list[MeshMass], list[str]]:
-    """Compare meshes with <inertial> for all links that have both; second, remarks, a line each."""
+def mesh_masses(robot: Robot, urdf: Path) -> tuple[list[tuple[str, ...]], list[str]]:
+    """Cells of `MASSES` for all links that have meshes and <inertial>; second, remarks, a line each."""
     try:
         import trimesh
     except ModuleNotFoundError:
         return [], [NOT_LOOKED_AT] if any(link.visual or link.collision for link in robot.links.values()) else []
-    masses, missing, remarks = list[MeshMass](), list[str](), list[str]()
+    rows, missing, remarks = list[tuple[str, ...]](), list[str](), list[str]()
     for link in robot.links.values():
         meshes = [shape for shape in link.visual or link.collision if isinstance(shape, MeshFile)]
         if link.inertial is None or not link.inertial.mass or not meshes:
@@ -64,17 +55,19 @@ def mesh_masses(robot: Robot, urdf: Path) -> tuple[list[MeshMass], list[str]]:
             remarks.append(f'link "{shown(link.name)}": {error}')
             continue
         mass, tiny = link.inertial.mass, np.finfo(float).tiny
-        if (volume := abs(float(mesh.volume))) < tiny:
-            masses.append(MeshMass(link.name, mass, 0.0, np.inf, np.nan, np.nan, False))
-            continue
-        unit = mesh.moment_inertia / mesh.volume  # per unit of mass
-        ratio = float(np.trace(unit) * mass / max(np.trace(link.inertial.inertia), tiny))
-        distance = float(np.linalg.norm(mesh.center_mass - link.inertial.center))
-        masses.append(MeshMass(link.name, mass, volume, mass / volume, ratio, distance, _is_closed(mesh)))
+        volume, kind, ratios = abs(float(mesh.volume)), "closed" if _is_closed(mesh) else "open", ("–",) * 3
+        if volume < tiny:
+            volume, kind = 0.0, "open"
+        else:
+            unit = mesh.moment_inertia / mesh.volume  # per unit of mass
+            ratio = float(np.trace(unit) * mass / max(np.trace(link.inertial.inertia), tiny))
+            distance = float(np.linalg.norm(mesh.center_mass - link.inertial.center))
+            ratios = f"{mass / volume:.4g}", f"{ratio:.3g}", f"{distance:.2g}"
+        rows.append((link.name, kind, f"{mass:.4g}", f"{volume:.3g}", *ratios))
     if missing:
         more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
         remarks.append(f"mesh not found: {shown(missing[0])}{more}; masses are those of <inertial> in any case")
-    return masses, remarks
+    return rows, remarks
 
 
 def mesh_path(filename: str, urdf: Path) -> Path | None:
@@ -150,9 +143,6 @@ def with_masses(robot: Robot, urdf: Path, filling: Filling) -> tuple[Robot, list
 
     Shapes for collisions come before those to be seen: they are closed and simple as a rule. The root stands still and
     needs no mass.
-
-    Raises:
-        InputError: a mesh is missing or cannot be read, and no cylinder takes its place; a shape has no volume.
     """
     links, remarks = dict[str, UrdfLink](robot.links), list[str]()
     for name, link in robot.links.items():
