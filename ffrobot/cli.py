@@ -12,9 +12,8 @@ import click
 
 from .commands.design import optimise, sensitivity, sweep, uncertainty
 from .commands.exchange import export, import_
-from .commands.pictures import plot, report, view
-from .commands.read import feasibility, info, linear, pose
-from .commands.stages import link, solve
+from .commands.results import feasibility, info, linear, plot, report, view
+from .commands.stages import link, pose, solve
 from .commands.studies import bench, fit, map_, smooth
 from .common.errors import FfrobotError
 from .common.interrupts import SIGNALS, EndOfCommand

@@ -1,4 +1,4 @@
-"""The commands of both stages: `link` and `solve`."""
+"""The commands of both stages: `link`, `pose` and `solve`."""
 
 from __future__ import annotations
 
@@ -162,3 +162,17 @@ def _tell(solution: Solution, path: Path, remarked: int) -> None:
         click.echo("\n".join(lines))
         for table in tables_of(results, "robustness of", robustness_cells):
             summary_console().print(table)
+
+
+@click.command()
+@scene_argument
+@python_option
+@logging_options
+def pose(scene_file: Path) -> None:
+    """Print the posture in which a scene starts, and the other ones that reach the same places (elbow, wrist)."""
+    from ..present.console import Display, summary_console
+    from ..present.start_postures import print_start
+
+    protect_scene(scene_file)
+    with Display() as display:
+        print_start(scene_file, display, summary_console())

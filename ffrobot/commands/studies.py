@@ -144,9 +144,15 @@ def fit(file: Path, measured: Path | None, frf: Path | None, vary: tuple[str, ..
 @python_option
 @logging_options
 def map_(
-    scene_file: Path, response: str | None, milling: Path | None, covariance: Path | None, figures: bool, batch: Batch,
-    output: Path | None, **which: Any,
-) -> None:  # fmt: skip
+    scene_file: Path,
+    response: str | None,
+    milling: Path | None,
+    covariance: Path | None,
+    figures: bool,
+    batch: Batch,
+    output: Path | None,
+    **which: Any,
+) -> None:
     """Map of the workspace: natural frequencies, stiffness, torque and deflection at rest, pose by pose.
 
     \b
