@@ -9,7 +9,7 @@ from beam_links import beam_link, rectangle
 from moved_scenes import tables_of
 from random_robots import random_scene
 from robots_3d import random_scene_in_3d
-from tables_3d import pin, scene
+from tables_3d import joint, pin, planar, scene
 
 import ffrobot
 
@@ -45,16 +45,14 @@ def bending(count=3, **of_link):
 
 def arm(*analyses, of_joints=(), of_bodies=(), **tables):
     """Two flexible links in the plane, whose tip follows a path."""
-    found = {
-        "name": "arm", "gravity": [0.0, -9.81],
-        "body": [{"name": f"link{k}", "link": bending()} | dict(of_bodies) for k in (1, 2)],
-        "joint": [pin("O", "ground", "link1.root") | dict(of_joints),
-                  pin("A", "link1.tip", "link2.root") | dict(of_joints)],
-        "initial": {"state": "static", "angles": {"link1": -0.4, "link2": 0.8}},
-        "trajectory": [{"name": "tip", "point": "link2.tip", "x": "0.80889 - 8*t**2", "y": "0.16397 + 6*t**2"}],
-        "analysis": list(analyses),
-    }  # fmt: skip
-    return ffrobot.make_scene(**found | tables)
+    bodies = [{"name": f"link{k}", "link": bending()} | dict(of_bodies) for k in (1, 2)]
+    joints = [
+        pin("O", "ground", "link1.root", **dict(of_joints)),
+        pin("A", "link1.tip", "link2.root", **dict(of_joints)),
+    ]
+    path = {"name": "tip", "point": "link2.tip", "x": "0.80889 - 8*t**2", "y": "0.16397 + 6*t**2"}
+    keys = {"initial": {"state": "static", "angles": {"link1": -0.4, "link2": 0.8}}, "trajectory": [path]}
+    return ffrobot.make_scene(**planar(bodies, joints, *analyses, **keys | tables))
 
 
 def patched(**layout):
@@ -63,7 +61,7 @@ def patched(**layout):
 
 def slider_crank(of_joints):
     tables = scenes_in_3d.read(FOLDER / "slider_crank" / "scene.toml") | {"analysis": [INVERSE, RELEASED]}
-    tables["joint"] = [joint | of_joints.get(joint["name"], {}) for joint in tables["joint"]]
+    tables["joint"] = [one | of_joints.get(one["name"], {}) for one in tables["joint"]]
     moments = {"O": 0.2, "guide": 0.1, "B": 0.3}
     return ffrobot.make_scene(**tables, load=[{"joint": j, "moment": f"{m}*sin(30*t)"} for j, m in moments.items()])
 
@@ -72,20 +70,14 @@ def slide(**tables):
     """A cart, a rod welded to it, a flexible link behind it; a way, an angle and the frame of the link on paths."""
     points = {"root": [0.0, 0.0], "tip": [0.3, 0.1]}
     cart = {"mass": 2.0, "inertia": 0.02, "center": [0.1, 0.05], "points": points}
-    found = {
-        "name": "slide", "gravity": [0.0, -9.81],
-        "body": [{"name": "cart", "rigid": cart}, {"name": "rod", "rigid": cart | {"mass": 0.5}},
-                 {"name": "arm", "link": bending()}],
-        "joint": [
-            {"name": "way", "type": "prismatic", "between": ["ground", "cart.root"], "at": [0.1, 0.0],
-             "axis": [2.0, 1.0]},
-            {"name": "weld", "type": "weld", "between": ["cart.tip", "rod.root"]},
-            pin("turn", "arm.root", "rod.tip"),
-        ],
-        "initial": {"state": "undeformed", "angles": {"arm": 0.5}},
-        "analysis": [INVERSE, AGAIN],
-    }  # fmt: skip
-    return ffrobot.make_scene(**found | tables)
+    bodies = [{"name": "cart", "rigid": cart}, {"name": "rod", "rigid": cart | {"mass": 0.5}}]
+    joints = [
+        joint("way", "prismatic", "ground", "cart.root", at=[0.1, 0.0], axis=[2.0, 1.0]),
+        joint("weld", "weld", "cart.tip", "rod.root"),
+        pin("turn", "arm.root", "rod.tip"),
+    ]
+    bodies, start = [*bodies, {"name": "arm", "link": bending()}], {"state": "undeformed", "angles": {"arm": 0.5}}
+    return ffrobot.make_scene(**planar(bodies, joints, INVERSE, AGAIN, initial=start, **tables))
 
 
 def spring(t, position, velocity):
@@ -159,13 +151,13 @@ def joints_of_all_types():
     joints = [pin("foot", "ground", "base.root", axis=[0.0, 0.6, 0.8], at=[0.1, 0.0, 0.2])]
     for name, own in types.items():
         bodies.append({"name": name, "rigid": FREE})
-        joints.append({"name": f"to_{name}", "type": name, "between": ["base.tip", f"{name}.root"]} | own)
+        joints.append(joint(f"to_{name}", name, "base.tip", f"{name}.root", **own))
     bodies.append({"name": "free", "rigid": FREE})
     moments = [
         {"joint": f"to_{name}", "moment": f"0.05*cos({9 + k}*t)"} for k, name in enumerate(("revolute", "screw"))
     ]
     return in_3d(
-        "joints", bodies, [joint | ({} if joint["type"] == "weld" else {"motor": False}) for joint in joints], RELEASED,
+        "joints", bodies, [one | ({} if one["type"] == "weld" else {"motor": False}) for one in joints], RELEASED,
         load=[*moments, {"point": "spherical.tip", "x": "2*t", "mz": "0.1"}, {"point": "free.tip", "y": "t"}],
     )  # fmt: skip
 
@@ -173,7 +165,7 @@ def joints_of_all_types():
 def arm_in_3d(*analyses, checkpoint="arm3_line_static", of_joints=(), of_bodies=(), **tables):
     """The arm of a checkpoint with other analyses."""
     found = tables_of(checkpoint, 1e-8)
-    found["joint"] = [joint | dict(of_joints) for joint in found["joint"]]
+    found["joint"] = [one | dict(of_joints) for one in found["joint"]]
     found["body"] = [body | (dict(of_bodies) if "link" in body else {}) for body in found["body"]]
     return ffrobot.make_scene(**found | {"analysis": list(analyses)} | tables)
 
@@ -189,9 +181,10 @@ def planar_case_in_3d(case, *analyses, **tables):
 def in_pieces():
     """A pendulum on a universal joint, of a link in two pieces."""
     of_link = LINK | {"modes": {"count": 6, "family": "all"}, "damping": {"rayleigh": [0.0, 1e-5]}}
-    joint = {"name": "O", "type": "universal", "between": ["ground", "link.root"], "axis": [0.0, 1.0, 0.0],
-             "second_axis": [0.0, 0.0, 1.0], "motor": False}  # fmt: skip
-    return in_3d("pieces", [{"name": "link", "link": of_link, "pieces": 2}], [joint], RELEASED)
+    foot = joint(
+        "O", "universal", "ground", "link.root", axis=[0.0, 1.0, 0.0], second_axis=[0.0, 0.0, 1.0], motor=False
+    )
+    return in_3d("pieces", [{"name": "link", "link": of_link, "pieces": 2}], [foot], RELEASED)
 
 
 def seven_joints(redundancy):
