@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from beam_links import beam_link
 from scipy.integrate import solve_bvp
-from tables_3d import joint, rigid, scene
+from tables_3d import joint, revolute, rigid, scene
 
 import ffrobot
 from ffrobot.common.errors import InputError
@@ -15,6 +15,7 @@ RPY = (0.3, -0.4, 0.7)
 SIDE = 0.01  # m, of the square section
 SOFT = 1e9
 EI = SOFT * SIDE**4 / 12
+MOMENT = ("mx", "my", "mz")
 
 
 def link(modulus=SOFT, condition="cantilever", width=SIDE, **keys):
@@ -29,6 +30,11 @@ def solved(body, pieces=None, **keys):
     wall = joint("wall", "weld", "ground", "beam.root", rpy=RPY)
     tables = scene(bodies, [wall], {"name": "rest", "kind": "static"}, gravity=[0.0, 0.0, 0.0])
     return ffrobot.solve(ffrobot.make_scene(**(tables | keys)))
+
+
+def acting(vector, components="xyz"):
+    """Load on the tip."""
+    return [{"point": "beam.tip"} | dict(zip(components, map(repr, vector.tolist()), strict=True))]
 
 
 def elastica(k):
@@ -53,9 +59,8 @@ def test_stresses_are_those_of_the_bent_link(pieces):
     """
     A, k, (y, z) = of_rpy(*RPY), 2.0, (SIDE / 2, SIDE / 3)
     force = A @ [0.0, 0.6 * k * EI, 0.8 * k * EI]
-    load = [{"point": "beam.tip"} | dict(zip("xyz", map(repr, force.tolist()), strict=True))]
     points = {"root": [0.0, y, z], "middle": [0.5, y, z]}
-    with solved(link(stress={"points": points}), pieces, load=load) as results:
+    with solved(link(stress={"points": points}), pieces, load=acting(force)) as results:
         found = {name: results[f"rest/stress/beam/points/{name}/stress"][0] for name in points}
         arm = results["rest/points/beam.tip/position"][0] - results["rest/points/beam.mid/position"][0]
         axes = of_quaternion(results["rest/points/beam.mid/quaternion"])[0]
@@ -82,10 +87,9 @@ def test_elastica_in_an_oblique_plane(condition, stiffened, order, least):
     across = np.array([0.0, np.cos(angle), np.sin(angle)])
     exact = A @ (x * np.array([1.0, 0.0, 0.0]) + w * across)
     tangent = A @ (np.cos(theta) * np.array([1.0, 0.0, 0.0]) + np.sin(theta) * across)
-    force = dict(zip("xyz", map(repr, (A @ across * k * EI).tolist()), strict=True))
     off, turned = [], []
     for pieces in (2, 4, 8):
-        keys = {"load": [{"point": "beam.tip", **force}], "geometric_stiffening": stiffened}
+        keys = {"load": acting(A @ across * k * EI), "geometric_stiffening": stiffened}
         with solved(link(condition=condition), pieces, **keys) as results:
             off.append(np.linalg.norm(results["rest/points/beam.tip/position"][0] - exact))
             section = of_quaternion(results["rest/points/beam.tip/quaternion"][0])
@@ -111,23 +115,17 @@ def test_loads_between_the_ends_of_a_piece_leave_its_link_as_it_is(pieces, known
 
 def test_a_moment_about_an_oblique_axis_bends_to_a_circle_and_twists():
     """Torque T along the axis alone: twist T L/GJ as by one link; a moment M across alone: a circle of radius EI/M."""
-    with solved(link(), 3, load=[{"point": "beam.tip", **moment(of_rpy(*RPY) @ [0.02, 0.0, 0.0])}]) as results:
+    with solved(link(), 3, load=acting(of_rpy(*RPY) @ [0.02, 0.0, 0.0], MOMENT)) as results:
         section = of_rpy(*RPY).T @ of_quaternion(results["rest/points/beam.tip/quaternion"][0])
-        GJ = (
-            SOFT / 2.6 * 0.1406 * SIDE**4
-        )  # of a square: 0.1406 a⁴ (Roark's Formulas for Stress and Strain, table 10.1)
+        GJ = SOFT / 2.6 * 0.1406 * SIDE**4  # of a square: Roark's Formulas for Stress and Strain, table 10.1
         assert np.arctan2(section[2, 1], section[1, 1]) == pytest.approx(0.02 / GJ, rel=1e-3)
     angle, turn = 0.8, 1.2
     axis = np.array([0.0, -np.sin(angle), np.cos(angle)])
-    with solved(link(), 12, load=[{"point": "beam.tip", **moment(of_rpy(*RPY) @ axis * turn * EI)}]) as results:
+    with solved(link(), 12, load=acting(of_rpy(*RPY) @ axis * turn * EI, MOMENT)) as results:
         tip = of_rpy(*RPY).T @ results["rest/points/beam.tip/position"][0]
     across = np.array([0.0, np.cos(angle), np.sin(angle)])
     exact = np.array([np.sin(turn) / turn, 0.0, 0.0]) + across * (1 - np.cos(turn)) / turn
     assert np.linalg.norm(tip - exact) < 5e-4  # a twelfth of turn²/24 in twelve pieces
-
-
-def moment(vector):
-    return dict(zip(("mx", "my", "mz"), map(repr, np.asarray(vector).tolist()), strict=True))
 
 
 CERAMIC = {"width": 0.01, "thickness": 5e-4, "modulus": 1e9, "d31": 1.1e-10, "allocation": "least-squares"}
@@ -163,8 +161,8 @@ def arm(pieces, **keys):
         bodies,
         gravity=[0.0, 0.0, -9.81],
         joint=[
-            {"name": "waist", "type": "revolute", "between": ["ground", "upper.root"], "axis": [0.0, 0.0, 1.0]},
-            {"name": "elbow", "type": "revolute", "between": ["upper.tip", "fore.root"], "axis": [0.0, -1.0, 0.0]},
+            revolute("waist", "ground", "upper.root"),
+            revolute("elbow", "upper.tip", "fore.root", [0.0, -1.0, 0.0]),
         ],
         payload=[{"point": "fore.tip", "mass": 0.2, "center": [0.0, 0.05, 0.0]}],
         load=[{"point": "upper.mid", "z": "-2.0"}],
@@ -211,11 +209,11 @@ def test_auto_takes_as_many_as_the_deflection_needs():
     """More for a soft link than for a stiff one, none for one that hardly bends: tips to 1e-3 of the length."""
     (x, w), _ = elastica(2.0)
     exact = of_rpy(*RPY) @ [x, w, 0.0]
-    force = dict(zip("xyz", map(repr, (of_rpy(*RPY)[:, 1] * 2.0 * EI).tolist()), strict=True))
-    with solved(link(), "auto", load=[{"point": "beam.tip", **force}]) as results:
+    load = acting(of_rpy(*RPY)[:, 1] * 2.0 * EI)
+    with solved(link(), "auto", load=load) as results:
         assert 10 <= results.attributes("rest/bodies/beam")["pieces"] <= 20
         assert np.linalg.norm(results["rest/points/beam.tip/position"][0] - exact) < 1e-3
-    with solved(link(1e3 * SOFT), "auto", load=[{"point": "beam.tip", **force}]) as results:
+    with solved(link(1e3 * SOFT), "auto", load=load) as results:
         assert "pieces" not in results.attributes("rest/bodies/beam")
 
 
