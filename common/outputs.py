@@ -1,7 +1,5 @@
 """What an output may replace: neither an input of the command nor a file of another kind."""
 
-from __future__ import annotations
-
 import os
 import re
 import stat

@@ -1,7 +1,5 @@
 """Runs under `mpirun`: which process this is, and work for the first one alone. mpi4py is loaded only there."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from typing import TypeVar, cast

@@ -1,7 +1,5 @@
 """Reading and validating TOML input files: one clear error that names file, key, expected and found."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -34,7 +32,7 @@ class Record(BaseModel):
     """The `space` whose scenes alone have such tables; None: all have."""
 
     @classmethod
-    def refuse_key(cls, key: str, others: Sequence[type[Record]]) -> str:
+    def refuse_key(cls, key: str, others: Sequence[type["Record"]]) -> str:
         """The message for a key that only `others` have; empty to call it an unknown key."""
         return ""
 

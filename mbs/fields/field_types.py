@@ -1,7 +1,5 @@
 """What the records of a scene file are made of: names, points, references, expressions in t, checks of keys."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace

@@ -6,8 +6,6 @@ limited jerk of three (Biagiotti and Melchiorri, Trajectory Planning for Automat
 speed is at most h/T₁, acceleration h/(T₁T₂), jerk h/(T₁T₂T₃)).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from math import exp, factorial, inf, perm, pi, sqrt
@@ -42,12 +40,12 @@ class Piecewise:
         """End time of the motion, s."""
         return float(self.breaks[-1])
 
-    def moved(self, factor: float = 1.0, delay: float = 0.0) -> Piecewise:
+    def moved(self, factor: float = 1.0, delay: float = 0.0) -> "Piecewise":
         """Return the motion stretched by `factor` about t = 0, then delayed by `delay` (s)."""
         powers = factor ** -np.arange(self.coefficients.shape[1] - 1, -1, -1.0)
         return Piecewise(factor * self.breaks + delay, self.coefficients * powers[None, :, None])
 
-    def along(self, change: Array) -> Piecewise:
+    def along(self, change: Array) -> "Piecewise":
         """Return the motion of one component times a vector `change` (n,)."""
         return Piecewise(self.breaks, self.coefficients * change)
 

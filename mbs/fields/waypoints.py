@@ -1,7 +1,5 @@
 """Waypoint tables and splines: functions of time through given values."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -62,7 +60,7 @@ class Waypoints:
     values: Array
     remarks: tuple[str, ...] = ()
 
-    def of_joint(self, joint: str) -> Waypoints:
+    def of_joint(self, joint: str) -> "Waypoints":
         """The column of a joint, as "value": see `OF_A_JOINT`. The whole table where it has none.
 
         Raises `ValueError` where two topics have the joint.

@@ -6,11 +6,11 @@ along its trajectories: loops then transmit their share of M v̇ − Q (`split_f
 """
 
 from collections.abc import Iterable, Mapping
+from typing import NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Array
-from ...common.structs import struct
 from ...fe_models.modal_body.unit_loads import PAIRS, interface_load_names
 from ..fields.field_types import split_point
 from ..model.known_motion import MotionForces, Wrench, motion_forces, required_forces
@@ -23,17 +23,11 @@ from .motion import acting_forces, places, system_of
 from .supply import behind_gears
 
 
-@struct
-class LinkLoads:
-    """Loads on a link during a motion.
+class LinkLoads(NamedTuple):
+    """Loads on a link during a motion."""
 
-    Attributes:
-        sizes: (T,) of unit loads by their names (`fe_models.modal_body.unit_loads`).
-        modal_force: (T, n) N/√kg, what else acts on its modes, in the coordinates of the equations: patches.
-    """
-
-    sizes: Mapping[str, Array]
-    modal_force: Array
+    sizes: Mapping[str, Array]  # (T,) of unit loads by their names (`fe_models.modal_body.unit_loads`)
+    modal_force: Array  # (T, n) N/√kg, what else acts on its modes, in the coordinates of the equations: patches
 
 
 def loads_on_links(run: Run, bodies: Iterable[str]) -> dict[str, LinkLoads]:

@@ -8,8 +8,6 @@ takes (simply supported: no twist there). The modal coordinates are those whose 
 points are where the pieces have them.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import MappingProxyType
 

@@ -5,15 +5,13 @@ joints that nothing else holds are in static equilibrium under gravity, payloads
 prescribed, too, it is that of the end. It is never read off a motion that may ring.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, null_space
+from ...common.arrays import Array, PPoly, null_space
 from ...common.errors import InputError, SolveError
 from ...common.libraries import scipy
 from ...common.structs import struct
@@ -26,9 +24,6 @@ from ..scene.analysis import TimedAnalysis
 from ..scene.mechanism import MechanismScene
 from ..scene.trajectories import Trajectory
 from .motion import section_motion
-
-if TYPE_CHECKING:
-    from scipy.interpolate import CubicHermiteSpline
 
 MOVED = 1e-6  # of the range of a target: by more it is not yet at its end
 GRID, ROUNDS = 2001, 3  # times at which a target is compared with its end, and how often between two of them
@@ -158,7 +153,7 @@ def settling(run: Run, rest: Rest, points: Sequence[str], tolerance: float, lowe
     return settled
 
 
-def _settling(path: CubicHermiteSpline, place: Array, since: float, tolerance: float, lowest: float) -> Settling:
+def _settling(path: PPoly, place: Array, since: float, tolerance: float, lowest: float) -> Settling:
     """Of a point on its `path` (m, by s), by the distance from its final `place` (d,)."""
 
     def off(t: Array | float) -> Array:

@@ -8,10 +8,9 @@ Report SME 3309, 1945; Craig, Structural Dynamics, 1981, ch. 15). Where static s
 the mode displacement method.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,30 +23,18 @@ METHODS = ("mode displacement", "mode acceleration")
 CHUNK_BYTES = 32e6  # of surface stresses at a time; more leaves the cache
 
 
-@struct
-class PointStress:
-    """Stress at a point over time, in the body frame; columns xx, yy, zz, yz, xz, xy.
+class PointStress(NamedTuple):
+    """Stress at a point over time, in the body frame; columns xx, yy, zz, yz, xz, xy."""
 
-    Attributes:
-        stress: (T, 6) Pa.
-        von_mises: (T,) Pa.
-    """
-
-    stress: Array
-    von_mises: Array
+    stress: Array  # (T, 6) Pa
+    von_mises: Array  # (T,) Pa
 
 
-@struct
-class SurfaceStress:
-    """Largest von Mises stress on the surface over time, and its position.
+class SurfaceStress(NamedTuple):
+    """Largest von Mises stress on the surface over time, and its position."""
 
-    Attributes:
-        von_mises_max: (T,) Pa.
-        position_of_max: (T, 3) m, undeformed, in the link's frame.
-    """
-
-    von_mises_max: Array
-    position_of_max: Array
+    von_mises_max: Array  # (T,) Pa
+    position_of_max: Array  # (T, 3) m, undeformed, in the link's frame
 
 
 @struct
@@ -56,7 +43,7 @@ class BodyStress:
 
     points: Mapping[str, PointStress]
     surface: SurfaceStress | None
-    recovery: Recovery
+    recovery: "Recovery"
 
     def largest(self) -> tuple[float, int, str]:
         """Largest von Mises stress in Pa, at which output, and where: a point's name or a position on the surface."""
@@ -107,7 +94,7 @@ class Recovery:
         sections = () if self.sections is None else (self.sections.moment, self.sections.force)
         return np.concatenate([self.modal, self.sizes, *sections], axis=1)
 
-    def at(self, rows: Indices) -> Recovery:
+    def at(self, rows: Indices) -> "Recovery":
         """Return these outputs alone."""
         of = self.sections
         if of is not None:

@@ -18,8 +18,6 @@ eigenvalues μ of K_ff^-½ S K_ff^-½ are the extreme relative changes of the st
 none left (Bathe, Finite Element Procedures, §6.8.2, linearized buckling).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property
@@ -128,7 +126,7 @@ class Missing(NamedTuple):
     of_length: float
     of_deflections: float
 
-    def grown_to(self, worst: Missing) -> Missing:
+    def grown_to(self, worst: "Missing") -> "Missing":
         """Scale to the `worst` link's error of deflections; that of points in proportion, but no more than its own."""
         if not 0.0 < self.of_deflections < worst.of_deflections:
             return self

@@ -6,8 +6,6 @@ where patches reach all modes, and p is a flat output (Fliess et al., Int. J. Co
 torques are then polynomials, and so is δ but for c e^{−K t/D}.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from math import ceil, comb, factorial
@@ -212,7 +210,7 @@ def _through(breaks: Array, values: Array) -> PPoly:
     return scipy.interpolate.PPoly(powers[::-1], breaks)
 
 
-def _on(curve: PPoly | scipy.interpolate.BSpline, breaks: Array) -> PPoly:
+def _on(curve: PPoly, breaks: Array) -> PPoly:
     """The same with pieces between other breaks, which contain its own."""
     degree = curve.k if isinstance(curve, scipy.interpolate.BSpline) else len(curve.c) - 1
     return scipy.interpolate.PPoly(

@@ -1,7 +1,5 @@
 """Newton's steps of a tracking problem (`problem`): quadratic programs in the values at breaks of its intervals."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from itertools import product
 from math import comb, factorial
@@ -107,7 +105,7 @@ class Iterate:
     iterations: int = 0
     moved: float = np.inf
 
-    def tracked(self, steps: Steps) -> Tracked:
+    def tracked(self, steps: "Steps") -> Tracked:
         """Return this as piecewise polynomials."""
         assert self.found is not None
         breaks, steps.sigma = steps.breaks, self.share
