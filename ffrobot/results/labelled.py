@@ -1,18 +1,14 @@
 """Histories of an analysis as a Dataset of xarray: dimensions, coordinates, units."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from xarray import Dataset
 
 from ..common.meanings import LABELS, meaning
 from .joints import unit_of
 
-if TYPE_CHECKING:
-    from .file import Results
-
+Results = Any  # of `results.file`, which calls this
 TIME, SAMPLES = "time", "control/time"
 
 
