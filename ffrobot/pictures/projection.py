@@ -18,23 +18,20 @@ class View(NamedTuple):
     viewer: Array
 
 
+def _view(azimuth: float, elevation: float) -> View:
+    """Z goes up, the viewer stands at an azimuth about it from x on, degrees."""
+    a, e = np.radians([azimuth, elevation])
+    right = np.array([-np.sin(a), np.cos(a), 0.0])
+    viewer = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+    return View(right, np.cross(viewer, right), viewer)
+
+
 # The link's x goes right, its y up, as in planar scenes; the viewer stands before z, towards the root and above.
-AZIMUTH, ELEVATION = np.radians(28.0), np.radians(24.0)
-RIGHT = np.array([np.cos(AZIMUTH), 0.0, np.sin(AZIMUTH)])
-UP = np.array([np.sin(ELEVATION) * np.sin(AZIMUTH), np.cos(ELEVATION), -np.sin(ELEVATION) * np.cos(AZIMUTH)])
-VIEWER = np.cross(RIGHT, UP)
-LINK = View(RIGHT, UP, VIEWER)
-
+LINK = View(*(axis[[1, 2, 0]] for axis in _view(-28.0, 24.0)))
 PLANE = View(*np.eye(3))  # of planar scenes: the viewer looks against z
-
-# Of 3D scenes: z goes up, the viewer stands in front of −y, towards +x and above.
-_AZIMUTH, _ELEVATION = np.radians(-55.0), np.radians(25.0)
-_TOWARDS = np.array([np.cos(_ELEVATION) * np.cos(_AZIMUTH), np.cos(_ELEVATION) * np.sin(_AZIMUTH), np.sin(_ELEVATION)])
-_RIGHT = np.array([-np.sin(_AZIMUTH), np.cos(_AZIMUTH), 0.0])
-SPACE = View(_RIGHT, np.cross(_TOWARDS, _RIGHT), _TOWARDS)
+SPACE = _view(-55.0, 25.0)  # of 3D scenes: the viewer stands in front of −y, towards +x and above
 _X, _Y, _Z = np.eye(3)
 FRONT, SIDE = View(_X, _Z, -_Y), View(_Y, _Z, _X)  # z goes up, as well; from above it is PLANE
-
 
 # Okabe and Ito, "Color universal design" (2008), without the yellow that paper swallows, and a gray that
 # is seen on light and dark pages for black.

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import field_validator, model_validator
 
 from ...common.arrays import Array
 from ...common.errors import InputError, quoted
@@ -90,7 +90,7 @@ class FigureRecord(Record):
     """Range of the horizontal axis; by default that of the data."""
     y_range: Range | None = None
     """Range of the vertical axis; by default that of the data."""
-    limits: tuple[float, ...] = Field(default=())
+    limits: tuple[float, ...] = ()
     """Values of horizontal lines, such as a voltage limit; in units of the axis."""
 
     @field_validator("name")

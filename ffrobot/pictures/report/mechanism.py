@@ -23,7 +23,7 @@ from ..motion import (
     tool_markers,
     visible_exaggeration,
 )
-from ..projection import AXIS_LENGTH, COLORS, PLANE, SPACE, TOOL_COLORS, TOOL_LENGTH, UP, VIEWER
+from ..projection import AXIS_LENGTH, COLORS, LINK, PLANE, SPACE, TOOL_COLORS, TOOL_LENGTH
 from ..shapes import AMPLITUDE, body_surface, coarse_surface, coarsened, drawn_mode, triangles_of
 from .charts import AnalysisRun, Chart, encoded, plain, shades
 
@@ -197,4 +197,4 @@ def surface_modes(links: Sequence[ModesOnPage]) -> dict[str, Any]:
                 "amplitude": AMPLITUDE * body.length / FINEST,
             }
         )
-    return {"links": entries, "up": UP.tolist(), "viewer": VIEWER.tolist()}
+    return {"links": entries, "up": LINK.up.tolist(), "viewer": LINK.viewer.tolist()}
