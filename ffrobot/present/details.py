@@ -1,7 +1,6 @@
 """What a solve prints with `--verbose`: everything that its summary leaves out."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from rich.console import Console
@@ -29,8 +28,7 @@ OF_FILE = ("status", "outputs", "rejected")  # of analyses: for the table of a r
 
 def print_details(solution: Solution, results: Results, console: Console) -> None:
     """Print tables of analyses and their findings, wall time per stage, skipped parts, and the results' paths."""
-    verdict = results.verdict
-    rows = ((one.name, analysis_cells(results, one)) for one in verdict.analyses)
+    rows = ((name, cells) for name in results.analyses for cells in analysis_cells(results, name))
     shown = ((name, {key: text for key, text in cells.items() if key not in OF_FILE}) for name, cells in rows)
     for table in named_tables("analysis", shown):
         console.print(table)
@@ -42,7 +40,7 @@ def print_details(solution: Solution, results: Results, console: Console) -> Non
         console.print()
         console.print(table)
     console.print()
-    for line in verdict.lines():
+    for line in results.verdict.lines():
         console.print(line)
     for line in _control_lines(_details(solution)):
         console.print(line)
@@ -75,13 +73,11 @@ def _tables(solution: Solution, results: Results) -> Iterator[Table]:
         yield from tables_of(results, first, cells_of)
     stresses = (row for name, result in solution.analyses.items() for row in _stresses(name, result))
     yield from named_tables("stress in", stresses)
-    kinds: Mapping[str, tuple[Any, Callable[[str, Any], Rows]]] = {
-        "linear model": (LinearModels, _linear),
-        "joints": (LinearModels | RobotAtRest, _conditions),
-    }
-    for first, (kind, rows_of) in kinds.items():
-        mine = ((name, record) for name, record in _details(solution).items() if isinstance(record, kind))
-        yield from named_tables(first, (row for name, record in mine for row in rows_of(name, record)))
+    details = _details(solution).items()
+    linear = ((name, one) for name, one in details if isinstance(one, LinearModels))
+    yield from named_tables("linear model", (row for of_one in linear for row in _linear(*of_one)))
+    at_rest = ((name, one) for name, one in details if isinstance(one, LinearModels | RobotAtRest))
+    yield from named_tables("joints", (row for of_one in at_rest for row in _conditions(*of_one)))
 
 
 def _notes(solution: Solution) -> Iterator[tuple[str, str]]:
@@ -158,10 +154,7 @@ TRANSFERS = 3  # of one motor to one output, whose zeros are listed: those with 
 UNDAMPED = 1e-9  # ratios below are round-off
 
 
-Rows = Iterator[tuple[str, Cells]]
-
-
-def _linear(name: str, linear: LinearModels) -> Rows:
+def _linear(name: str, linear: LinearModels) -> Iterator[tuple[str, Cells]]:
     for model, modes in zip(linear.models, linear.modes, strict=True):
         cells = {
             "t (s)": f"{model.time:g}",
@@ -176,7 +169,7 @@ def _lowest(frequency: Array) -> str:
     return ", ".join(f"{f:.4g}" for f in frequency[frequency > 0.0][:FREQUENCIES])
 
 
-def _conditions(name: str, at_rest: LinearModels | RobotAtRest) -> Rows:
+def _conditions(name: str, at_rest: LinearModels | RobotAtRest) -> Iterator[tuple[str, Cells]]:
     for t, at in zip(at_rest.times, at_rest.conditions, strict=True):
         for condition, state in at.items():
             stiffness = [(point, *_stiffness(C)) for point, C in state.compliance.items()] or [("", "", "")]

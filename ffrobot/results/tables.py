@@ -5,24 +5,26 @@ from collections.abc import Iterator
 import numpy as np
 
 from .file import Results, status_in_words
-from .verdict import AnalysisVerdict, millimeters, vibrates
+from .verdict import millimeters, vibrates
 
 Cells = dict[str, str]
 """A row by heading, without the name of the analysis."""
 
 
-def analysis_cells(results: Results, verdict: AnalysisVerdict) -> Cells:
-    """Return the table row of an analysis: status, integrator, steps, tolerance, wall time."""
+def analysis_cells(results: Results, analysis: str) -> Iterator[Cells]:
+    """Yield the table row of an analysis: status, integrator, steps, tolerance, wall time."""
     from ..mbs.run.integrators import Choice  # loads the core
+    from .judging import end_of  # likewise
 
-    about, time = results.attributes(verdict.name), results.time(verdict.name)
-    integrated, violation = about["integrator"] != "none", results[f"{verdict.name}/constraint_violation"]
+    about, time = results.attributes(analysis), results.time(analysis)
+    integrated, violation = about["integrator"] != "none", results[f"{analysis}/constraint_violation"]
     of_steps = {key: f"{about.get(key, '')}" if integrated else "" for key in ("steps", "rejected", "evaluations")}
-    return {
+    asked = "" if about["status"] == "completed" else f" of {end_of(results.scene, analysis):g}"
+    yield {
         "kind": str(about["kind"]),
         "status": status_in_words(about),
         "integrator": Choice(str(about["integrator"]), "").in_words if integrated else "",
-        "end (s)": verdict.reached_in_words,
+        "end (s)": f"{time[-1]:g}{asked}",
         "outputs": f"{len(time)}",
         **of_steps,
         "tolerance": f"{about['tolerance']:.0e}" if integrated else "",

@@ -10,7 +10,7 @@ from ffrobot.pictures.motion import MovingBody
 from ffrobot.pictures.projection import COLORS
 from ffrobot.pictures.report import write_report
 from ffrobot.pictures.report.charts import Chart, history_charts, runs
-from ffrobot.pictures.report.page import TABLES
+from ffrobot.pictures.report.page import table_of
 from ffrobot.pictures.shapes import Shape, thickened
 from ffrobot.results.file import Results
 
@@ -132,7 +132,7 @@ def test_drag_turns_the_scene(paused):
 def test_charts_and_tables_of_the_arm(arm_3r):
     with Results(arm_3r.folder / "scene.results.h5") as results:
         charts = {chart.name: chart for chart in history_charts([results])}
-        rows = {what: value.split() for _, what, value, _ in TABLES["peaks"](runs([results])).rows}
+        rows = {what: value.split() for _, what, value, _ in table_of("peaks", runs([results])).rows}
         largest = np.abs(results["inverse/joints/waist/moment"]).max()
     range_of_error = charts["error_tool"].layout["yaxis"]["autorangeoptions"]["include"]
     assert range_of_error == pytest.approx([0.0, 1e-6])  # mm: rounding is a line at zero

@@ -19,7 +19,7 @@ from ffrobot.pictures.motion import chosen_frames, targets
 from ffrobot.pictures.report import write_report
 from ffrobot.pictures.report.charts import MAX_POINTS, distinct_parts, kept_outputs, runs
 from ffrobot.pictures.report.mechanism import mechanism
-from ffrobot.pictures.report.page import TABLES
+from ffrobot.pictures.report.page import table_of
 from ffrobot.results.file import Results
 
 
@@ -62,7 +62,7 @@ def test_forward_analyses_are_measured_against_the_path_they_should_follow(resul
 
 
 def test_peaks_are_those_of_the_file(results, two_link):
-    rows = {(analysis, what): (value, at) for analysis, what, value, at in TABLES["peaks"](runs([results])).rows}
+    rows = {(analysis, what): (value, at) for analysis, what, value, at in table_of("peaks", runs([results])).rows}
     moment = two_link.file["inverse/joints/O/moment"]
     value, at = rows["inverse", "motor of joint O"]
     assert value == f"{moment.attrs['peak']:.4g} N·m"

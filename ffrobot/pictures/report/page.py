@@ -4,7 +4,6 @@ import hashlib
 from base64 import b64encode
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -31,8 +30,9 @@ class Table(NamedTuple):
     rows: Sequence[tuple[str, ...]]
 
 
-def _of_cells(first: str, cells_of: Callable[[Results, str], Iterable[Cells]], runs: Sequence[AnalysisRun]) -> Table:
-    """Rows by heading, below `first` the names of their runs."""
+def table_of(name: str, runs: Sequence[AnalysisRun]) -> Table:
+    """Return one of `TABLES`."""
+    first, cells_of = TABLES[name]
     named = [(run.label, cells) for run in runs for cells in cells_of(run.results, run.analysis)]
     heading = (first, *(key.replace("\n", " ") for key in named[0][1])) if named else ()
     return Table(heading, [(name, *cells.values()) for name, cells in named])
@@ -132,18 +132,17 @@ def _zeros(results: Results, analysis: str) -> Iterator[Cells]:
     }
 
 
-TABLES: Mapping[str, Callable[[Sequence[AnalysisRun]], Table]] = {
-    "analyses": partial(_of_cells, "analysis", lambda results, name: [analysis_cells(results, results.verdict[name])]),
-    "loops": partial(_of_cells, "closed loop", loop_cells),
-    "zeros": partial(_of_cells, "motors only", _zeros),
-    "placements": partial(_of_cells, "placement", placement_cells),
-    "warnings": _warnings_table,
-    "bending": partial(_of_cells, "analysis", _bending),
-    "peaks": partial(_of_cells, "analysis", _peaks),
-    "voltages": partial(_of_cells, "voltages of", voltage_cells),
-    "settling": partial(_of_cells, "residual vibration", settling_cells),
+TABLES: Mapping[str, tuple[str, Callable[[Results, str], Iterable[Cells]]]] = {
+    "analyses": ("analysis", analysis_cells),
+    "loops": ("closed loop", loop_cells),
+    "zeros": ("motors only", _zeros),
+    "placements": ("placement", placement_cells),
+    "bending": ("analysis", _bending),
+    "peaks": ("analysis", _peaks),
+    "voltages": ("voltages of", voltage_cells),
+    "settling": ("residual vibration", settling_cells),
 }
-"""What the page calls them."""
+"""The heading of the names of runs, and further cells, by what the page calls them."""
 
 
 def write_report(paths: Sequence[Path], path: Path) -> None:
@@ -234,7 +233,8 @@ def _of_results(files: Sequence[Results]) -> tuple[dict[str, Any], list[Chart]]:
         "histories": folded(histories),
         "modes": modes,
         "verdicts": [_verdict(run) for run in all_runs],
-        **{name: table(all_runs) for name, table in TABLES.items()},
+        "warnings": _warnings_table(all_runs),
+        **{name: table_of(name, all_runs) for name in TABLES},
         "notes": notes,
         "skipped": [(source, line) for r, source in labelled(files) for line in r.skipped],
     }
