@@ -15,7 +15,7 @@ from ...mbs.inversion.zero_dynamics import is_unstable
 from ...results.file import Results
 from ...results.joints import labelled_coordinates
 from ...results.tables import Cells, analysis_cells, loop_cells, placement_cells, settling_cells, voltage_cells
-from ...results.verdict import millimeters, number
+from ...results.verdict import AnalysisVerdict, millimeters, number
 from ..figures.shared import bending_points
 from ..motion import targets
 from ..studies.study import Study, read_study, study_files
@@ -104,13 +104,12 @@ def _sha256(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def _verdict(run: AnalysisRun) -> dict[str, Any]:
+def _verdict(label: str, verdict: AnalysisVerdict) -> dict[str, Any]:
     """The answer of one run and the lines below it; `mood` is "good", "bad" or "" where nothing is asked."""
-    verdict = run.results.verdict[run.analysis]
     headline, *facts = verdict.lines()
     is_bad = verdict.status != "completed" or verdict.feasible is False
     return {
-        "label": run.label,
+        "label": label,
         "mood": "bad" if is_bad else "good" if verdict.feasible else "",
         "headline": headline.removeprefix(f"{verdict.name}: "),
         "facts": [fact.strip() for fact in facts],
@@ -224,7 +223,7 @@ def _of_results(files: Sequence[Results]) -> tuple[dict[str, Any], list[Chart]]:
         )
     moving, notes = mechanism(all_runs)
     modes, histories = link_modes(all_runs), history_charts(files)
-    shapes = surface_modes(modes)
+    shapes, judged = surface_modes(modes), (one for results in files for one in results.verdict.analyses)
     content = {
         "mechanism": moving,
         "is_plane": True in planes,
@@ -232,7 +231,7 @@ def _of_results(files: Sequence[Results]) -> tuple[dict[str, Any], list[Chart]]:
         "modes_3d": shapes,
         "histories": folded(histories),
         "modes": modes,
-        "verdicts": [_verdict(run) for run in all_runs],
+        "verdicts": [_verdict(run.label, one) for run, one in zip(all_runs, judged, strict=True)],
         "warnings": _warnings_table(all_runs),
         **{name: table_of(name, all_runs) for name in TABLES},
         "notes": notes,
