@@ -29,11 +29,18 @@ _CONTROL = re.compile(r"\s*CEND\b", re.IGNORECASE)
 
 @dataclass
 class Card:
-    """Bulk data card: `name` in upper case, position, and fields after the name, continuation lines included."""
+    """Bulk data card, or a line of it: `name` in upper case, position, and fields after the name.
+
+    `begin` and `end` are the marks that tell which line goes on with which.
+    """
 
     name: str
     place: str
     fields: list[str]
+    begin: str
+    end: str
+    follows: bool
+    is_half: bool  # of 16 columns, with * at its end: another line has to follow
 
     def __str__(self) -> str:
         return f"{self.name}, {self.place}"
@@ -50,19 +57,6 @@ class Card:
     def real(self, number: int) -> float:
         """A number in a field, 0 where it is empty. Raises `InputError` where it is none."""
         return number_of(self.text(number) or "0", str(self))
-
-
-@dataclass
-class _Row:
-    """A line of a card; `begin` and `end` are the marks that tell which line goes on with which."""
-
-    name: str
-    place: str
-    fields: list[str]
-    begin: str
-    end: str
-    follows: bool
-    is_half: bool  # of 16 columns, with * at its end: another line has to follow
 
 
 def cards(path: Path) -> Iterator[Card]:
@@ -93,12 +87,11 @@ def cards(path: Path) -> Iterator[Card]:
             raise InputError(f"{row.place}: expected a line that continues this one (*)", "none")
         if row.follows:
             continue
-        fields = list(row.fields)
         while (k := after.get(k, -1)) >= 0:
-            fields += rows[k].fields
-        while fields and not fields[-1]:
-            fields.pop()
-        yield Card(row.name, row.place, fields)
+            row.fields += rows[k].fields
+        while row.fields and not row.fields[-1]:
+            row.fields.pop()
+        yield row
 
 
 def _bulk(path: Path) -> Iterator[Line]:
@@ -128,7 +121,7 @@ def _included(following: Iterator[str], line: str) -> str | None:
     return text.strip("'\" ")
 
 
-def _row(line: Line) -> _Row:
+def _row(line: Line) -> Card:
     text = line.text
     if "," in text:
         entries = [entry.strip() for entry in text.split(",")]
@@ -154,7 +147,7 @@ def _row(line: Line) -> _Row:
         raise InputError(f"{line.place}: expected cards one by one", "replicated ones (=)")
     follows = not name or name[0] in "+*"
     last = entries[width + 1]
-    return _Row(
+    return Card(
         name=name.rstrip("*").strip().upper(),
         place=line.place,
         fields=entries[1 : width + 1],

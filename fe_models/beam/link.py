@@ -43,13 +43,11 @@ def beam_modal_body(link: BeamLink, path: Path, progress: Progress) -> ModalBody
     count = len(modes)
     modes += static
     fields, modal_mass = np.zeros((6, stations.x.size, len(modes))), np.zeros((len(modes), len(modes)))
-    for k, one in enumerate(modes):
-        model = models[one.family]
+    for family, model in models.items():
+        own, X = [k for k, one in enumerate(modes) if one.family == family], _together(model, family, modes)
+        modal_mass[np.ix_(own, own)] = X.T @ (model.M @ X)
         for row, values in model.fields.items():
-            fields[row, :, k] = values @ one.x
-        for i, other in enumerate(modes[: k + 1]):
-            if other.family == one.family:
-                modal_mass[i, k] = modal_mass[k, i] = one.x @ (model.M @ other.x)
+            fields[row][:, own] = values @ X
     fields = fields * canonical_signs(fields)
     progress(f"{link.name}: integrating the inertia")
     interfaces = {

@@ -89,11 +89,8 @@ def canonical_signs(fields: Array) -> Array:
     The dominant translation is then positive at the station nearest the root where it exceeds half its largest value;
     of a mode without translation, the dominant rotation.
     """
-    signs = np.ones(fields.shape[2])
-    for k in range(signs.size):
-        rows = fields[:3, :, k]
-        if not np.any(rows):
-            rows = fields[3:, :, k]
-        dominant = rows[np.argmax(np.abs(rows).max(axis=1))]
-        signs[k] = np.sign(dominant[np.argmax(np.abs(dominant) > 0.5 * np.abs(dominant).max())])
-    return signs
+    rows = np.where(np.any(fields[:3], axis=(0, 1)), fields[:3], fields[3:])
+    largest = np.abs(rows).max(axis=1).argmax(axis=0)
+    dominant = np.take_along_axis(rows, largest[None, None], axis=0)[0]
+    first = np.argmax(np.abs(dominant) > 0.5 * np.abs(dominant).max(axis=0), axis=0)
+    return np.sign(np.take_along_axis(dominant, first[None], axis=0)[0])
