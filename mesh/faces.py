@@ -29,6 +29,7 @@ _ALONG = float(np.cos(np.radians(30)))
 # How far from a face, relative to its size, the point may lie that is to pick it.
 _NEAR = 0.02
 _LISTED = 12
+AREA = 1e-9  # of the bed of a patch, relative, that may be off
 
 
 @struct
@@ -215,7 +216,7 @@ def _patch_beds(boundary: PartBoundary, geometry: SolidGeometry, patches: Surfac
             along = np.all((corners[..., 0] >= begin - slack) & (corners[..., 0] <= end + slack), axis=1)
             bed = np.flatnonzero(level & along)
             area, expected = boundary.area[bed].sum(), (end - begin) * patches.width
-            if abs(area - expected) > 1e-6 * expected:
+            if abs(area - expected) > AREA * expected:
                 raise InputError(
                     f"surface_patch: expected {expected:.6g} m² of free surface under patch {k + 1} ({name})",
                     f"{area:.6g} m²",

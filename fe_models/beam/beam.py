@@ -25,7 +25,7 @@ from ...mesh.compat import compiled_form, function_space
 from ..link_records.families import Family
 from ..link_records.link import BeamLink
 from .line import R_X, R_Y, R_Z, U_X, U_Y, U_Z, Functions, hermite, lagrange
-from .sections import Property, cellwise, rod_properties, second_moment, shear_modulus
+from .sections import cellwise, rod_properties, second_moment, shear_modulus
 
 Bending = tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, list[int]]
 """K, M, strains, deflection and rotation at the stations, fixed degrees of freedom."""
@@ -51,7 +51,7 @@ def family_model(link: BeamLink, family: Family, forms: BeamForms, stations: Arr
     """The eigenproblem of `family` on the elements of `forms`, read at `stations` (k,), in m."""
     if family in ("axial", "torsion"):
         V = lagrange(forms.nodes, 3)  # K = ∫EA u' v' dx, M = ∫ρA u v dx
-        EA, rhoA = (cellwise(link, forms.nodes, each) for each in rod_properties(link, family))
+        EA, rhoA = rod_properties(link, family, forms.nodes)
         K, M, strain = forms.matrix(EA, V, 1), forms.matrix(rhoA, V), V.root(EA, 1)
         fields, fixed = {U_X if family == "axial" else R_X: V.at(stations)}, [0]
     else:
@@ -65,17 +65,16 @@ def family_model(link: BeamLink, family: Family, forms: BeamForms, stations: Arr
     return FamilyModel(K, M, strain[:, free], {row: values[:, free] for row, values in fields.items()})
 
 
-def _euler_bernoulli(link: BeamLink, forms: BeamForms, stations: Array, second_moment: Property) -> Bending:
+def _euler_bernoulli(link: BeamLink, forms: BeamForms, stations: Array, second_moment: str) -> Bending:
     """K = ∫EI w'' v'' dx, M = ∫ρA w v dx on cubic Hermite elements; stations read w and w'."""
     V, E, rho = hermite(forms.nodes), link.material.youngs_modulus, link.material.density
-    EI = cellwise(link, forms.nodes, lambda s: E * second_moment(s))
-    rhoA = cellwise(link, forms.nodes, lambda s: rho * s.area)
+    EI, rhoA = E * cellwise(link, forms.nodes, second_moment), rho * cellwise(link, forms.nodes, "area")
     fixed = [0, 1] if link.reference.holds_root else [0, V.x.size - 2]
     read = V.at(stations), V.at(stations, derivative=1)
     return forms.matrix(EI, V, 2), forms.matrix(rhoA, V), V.root(EI, 2), *read, fixed
 
 
-def _timoshenko(link: BeamLink, forms: BeamForms, stations: Array, second_moment: Property) -> Bending:
+def _timoshenko(link: BeamLink, forms: BeamForms, stations: Array, second_moment: str) -> Bending:
     """K = ∫EI θ' η' + kGA (w' − θ)(v' − η) dx, M = ∫ρA w v + ρI θ η dx; w cubic, θ quadratic: no locking.
 
     Stations read w and the section's rotation θ.
@@ -83,10 +82,8 @@ def _timoshenko(link: BeamLink, forms: BeamForms, stations: Array, second_moment
     nodes = forms.nodes
     W, T = lagrange(nodes, 3), lagrange(nodes, 2)
     E, G, rho = link.material.youngs_modulus, shear_modulus(link), link.material.density
-    EI = cellwise(link, nodes, lambda s: E * second_moment(s))
-    kGA = cellwise(link, nodes, lambda s: s.shear * G * s.area)
-    rhoA = cellwise(link, nodes, lambda s: rho * s.area)
-    rhoI = cellwise(link, nodes, lambda s: rho * second_moment(s))
+    area, moment = cellwise(link, nodes, "area"), cellwise(link, nodes, second_moment)
+    EI, kGA, rhoA, rhoI = E * moment, G * area * cellwise(link, nodes, "shear"), rho * area, rho * moment
     shear = -forms.matrix(kGA, W, 1, T, 0)
     K = sp.bmat(
         [[forms.matrix(kGA, W, 1), shear], [shear.T, forms.matrix(EI, T, 1) + forms.matrix(kGA, T)]], format="csr"

@@ -30,7 +30,7 @@ from ..modal_body.lumped_masses import of_turning
 from ..modal_body.parts import LEVI_CIVITA, Invariants
 from ..modal_body.unit_loads import MOTIONS, inertia_wrenches
 from .line import R_X, R_Y, R_Z, U_X, U_Y, U_Z, Functions, gram
-from .sections import Property, cellwise
+from .sections import cellwise
 
 
 def shape_integrals(link: BeamLink, stations: Functions, fields: Array) -> Invariants:
@@ -44,7 +44,6 @@ def shape_integrals(link: BeamLink, stations: Functions, fields: Array) -> Invar
     S̄_11 + S̄_22 + S̄_33 stays true. What such a link has of inertia about its own axis, in space, is the spin inertia
     ½∫ρI_p (ω_1 + φ̇)² dx: J_s = ∫ρI_p, h_s = ∫ρI_p φ, S_s = ∫ρI_p φᵀφ, apart from the integrals over the axis.
     """
-    rho = link.material.density
     line_mass = link.model.theory == "euler-bernoulli"
     zero = np.zeros_like(fields[U_X])
     Phi = [
@@ -56,8 +55,8 @@ def shape_integrals(link: BeamLink, stations: Functions, fields: Array) -> Invar
     one = np.ones_like(stations.x)
     position = np.zeros((3, 3, stations.x.size))
     position[0, 0], position[1, 1], position[2, 2] = stations.x, one, one
-    moments: list[Property] = [lambda s: s.area, lambda s: s.I_yy, lambda s: s.I_zz]
-    weights = [weighted(link, stations, moment, rho) for moment in (moments[:1] if line_mass else moments)]
+    moments = ["area"] if line_mass else ["area", "I_yy", "I_zz"]
+    weights = [weighted(link, stations, moment) for moment in moments]
 
     n = fields.shape[2]
     S_bar = np.einsum("i,lin->ln", weights[0] @ one, Phi[0])
@@ -69,7 +68,7 @@ def shape_integrals(link: BeamLink, stations: Functions, fields: Array) -> Invar
         S_bar_kl += np.einsum("kim,lin->klmn", shape, W_shape)
     J_spin, h_spin, S_spin = 0.0, np.zeros(n), np.zeros((n, n))
     if line_mass:
-        spin, twist = weighted(link, stations, lambda s: s.I_p, rho), fields[R_X]
+        spin, twist = weighted(link, stations, "I_p"), fields[R_X]
         J_spin, h_spin, S_spin = float(one @ (spin @ one)), (spin @ one) @ twist, twist.T @ spin @ twist
         S_bar_kl[2, 2] += S_spin
     first = float(stations.x @ (weights[0] @ one))
@@ -87,15 +86,13 @@ def shape_integrals(link: BeamLink, stations: Functions, fields: Array) -> Invar
     )
 
 
-def weighted(link: BeamLink, stations: Functions, moment: Property, rho: float) -> sp.csr_matrix:
+def weighted(link: BeamLink, stations: Functions, moment: str) -> sp.csr_matrix:
     """Return the matrix (k, k) of ∫ρ·moment·a b dx for two fields a, b at the stations."""
-    return gram(stations.root(cellwise(link, stations.nodes, lambda s: rho * moment(s))))
+    return gram(stations.root(link.material.density * cellwise(link, stations.nodes, moment)))
 
 
-ROTARY: Sequence[tuple[Property, Sequence[float]]] = (
-    (lambda s: s.I_yy, (1.0, 0.0, 1.0)),
-    (lambda s: s.I_zz, (1.0, 1.0, 0.0)),
-)
+Rotary = Mapping[str, Sequence[float]]
+ROTARY: Rotary = {"I_yy": (1.0, 0.0, 1.0), "I_zz": (1.0, 1.0, 0.0)}
 """Second moments of a section, and about which axes they make it inert."""
 
 POINTS = 5  # Gauss points of an element: exact, since of cubics no product is of a degree above 8
@@ -108,13 +105,13 @@ def geometric_stiffness(link: BeamLink, stations: Functions, fields: Array, inte
     mesh. Euler–Bernoulli links are a line of mass: their spin inertia has no second-order motion.
     """
     x, weight, values, slopes = _at_gauss_points(stations, fields)
-    forces = section_forces(link, x, interfaces, ROTARY if link.model.theory == "timoshenko" else ())
+    forces = section_forces(link, x, interfaces, ROTARY if link.model.theory == "timoshenko" else {})
     pairs = zip(forces * weight, _products(values, slopes), strict=True)
     total = np.sum([np.tensordot(force, products, axes=1) for force, products in pairs], axis=0)
     matrices = 0.5 * (total + total.transpose(0, 2, 1))
     if link.model.theory == "timoshenko":
-        for k, (moment, _) in enumerate(ROTARY, start=1):
-            W = weighted(link, stations, moment, link.material.density)
+        for k, moment in enumerate(ROTARY, start=1):
+            W = weighted(link, stations, moment)
             products = np.array([[a.T @ (W @ b) for b in fields[R_X:]] for a in fields[R_X:]])
             matrices[3:MOTIONS] += of_turning(np.diag(np.eye(3)[k]), products)
     return matrices
@@ -140,9 +137,7 @@ def _products(values: Array, slopes: Array) -> Array:
     return np.concatenate([on_forces, on_moments])
 
 
-def section_forces(
-    link: BeamLink, x: Array, interfaces: Mapping[str, float], rotary: Sequence[tuple[Property, Sequence[float]]]
-) -> Array:
+def section_forces(link: BeamLink, x: Array, interfaces: Mapping[str, float], rotary: Rotary) -> Array:
     """Return force and moment (6, l, g) at x (g,) in the straight link by unit load, under its reference condition.
 
     Loads at the tip act on the section there, too. `rotary`: the inertia of sections that turn, see `ROTARY`.
@@ -174,28 +169,29 @@ def of_tip_support(link: BeamLink, x: Array, at_root: Array) -> Array:
     return of_load(np.stack([none, -at_root[5] / L, at_root[4] / L, none, none, none]), L - x)
 
 
-def _of_inertia(link: BeamLink, x: Array, rotary: Sequence[tuple[Property, Sequence[float]]]) -> Array:
+def _of_inertia(link: BeamLink, x: Array, rotary: Rotary) -> Array:
     """(6, `MOTIONS`, g) of d'Alembert's loads on the link fixed at its root.
 
     Sections at s bear forces ρA (a + b s), of small bodies at 0 and 1 m, and, with rotary inertia, moments.
     """
     e1, nothing = np.eye(3)[:1], np.zeros(1)
-    M = [_beyond(link, x, lambda s: s.area, power) for power in range(3)]
+    M = [_beyond(link, x, "area", power) for power in range(3)]
     a, b = (inertia_wrenches(place, np.ones(1), np.zeros((1, 3)))[0, :3, :, None] for place in (0 * e1, e1))
     b = b - a
     n = a * M[0] + b * M[1]
     m = _lever(a * M[1] + b * M[2] - x * n)
-    for moment, inertia in rotary:
+    for moment, inertia in rotary.items():
         wrenches = inertia_wrenches(0 * e1, nothing, np.array([inertia]))
         m += wrenches[0, 3:, :, None] * _beyond(link, x, moment, 0)
     return np.concatenate([n, m])
 
 
-def _beyond(link: BeamLink, x: Array, moment: Property, power: int) -> Array:
+def _beyond(link: BeamLink, x: Array, moment: str, power: int) -> Array:
     """∫_x^L ρ·moment·sᵖ ds for each x (g,)."""
     total = np.zeros_like(x)
     points = link.geometry.breakpoints
     for start, end, section in zip(points[:-1], points[1:], link.sections, strict=True):
         lower = np.clip(x, start, end)
-        total += link.material.density * moment(section) * (end ** (power + 1) - lower ** (power + 1)) / (power + 1)
+        per_length = link.material.density * getattr(section, moment)
+        total += per_length * (end ** (power + 1) - lower ** (power + 1)) / (power + 1)
     return total

@@ -21,8 +21,8 @@ from .beam import BeamForms, FamilyModel, family_model
 from .invariants import geometric_stiffness, shape_integrals
 from .line import R_X, Functions, lagrange
 from .modes import BeamFlexibility, Mode, attachment_modes, lowest_modes, modes_of, ritz_modes
-from .sections import section_outlines, shear_modulus
-from .stress import beam_stresses, segments
+from .sections import section_outlines, section_property, segments, shear_modulus
+from .stress import beam_stresses
 
 # Elements are not cut closer to their ends than this fraction of their length.
 SLIVER = 0.01
@@ -99,19 +99,19 @@ def _with_sections(
     link: BeamLink, stations: Functions, position: Array, translation: Array, rotation: Array
 ) -> Stations:
     """The stations, with extents, outlines and rigidities of the sections from each on; GJ where there is a ν."""
-    segment, E = segments(link, stations.x), link.material.youngs_modulus
-    of_segment = [(s.height, s.width, E * s.area, E * s.I_yy, E * s.I_zz, s.torsion) for s in link.sections]
-    height, width, EA, EI_yy, EI_zz, J = np.array(of_segment)[segment].T
+    names = ("height", "width", "area", "I_yy", "I_zz", "torsion")
+    height, width, area, I_yy, I_zz, J = (section_property(link, stations.x, name) for name in names)
+    E = link.material.youngs_modulus
     return Stations(
         position,
         translation,
         rotation,
         height,
         stations.element,
-        outline=section_outlines(link.shapes)[segment],
-        rigidity=np.stack([EA, EI_yy], axis=1),
+        outline=section_outlines(link.shapes)[segments(link, stations.x)],
+        rigidity=E * np.stack([area, I_yy], axis=1),
         width=width,
-        out_of_plane_rigidity=EI_zz,
+        out_of_plane_rigidity=E * I_zz,
         torsional_rigidity=None if link.material.poissons_ratio is None else shear_modulus(link) * J,
     )
 

@@ -1,16 +1,13 @@
 """Properties of the sections of a beam, by element and by family of motion, and outlines for pictures."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, Integers
 from ...mesh.records import RectangleSection, SectionRecord
 from ..link_records.families import Family
 from ..link_records.link import BeamLink
-from ..link_records.section import Section
-
-Property = Callable[[Section], float]
 
 
 def shear_modulus(link: BeamLink) -> float:
@@ -19,24 +16,31 @@ def shear_modulus(link: BeamLink) -> float:
     return link.material.youngs_modulus / (2 * (1 + link.material.poissons_ratio))
 
 
-def rod_properties(link: BeamLink, family: Family) -> tuple[Property, Property]:
-    """Stiffness, EA in N or GJ in N·m², and mass or moment of inertia per length, of axial or torsional motion."""
-    E, rho = link.material.youngs_modulus, link.material.density
-    if family == "axial":
-        return lambda s: E * s.area, lambda s: rho * s.area
-    G = shear_modulus(link)
-    return lambda s: G * s.torsion, lambda s: rho * s.I_p
+def rod_properties(link: BeamLink, family: Family, nodes: Array) -> tuple[Array, Array]:
+    """Stiffness (e,), EA in N or GJ in N·m², and mass or moment of inertia per length, of axial or torsional motion."""
+    stiffness, inertia = ("area", "area") if family == "axial" else ("torsion", "I_p")
+    modulus = link.material.youngs_modulus if family == "axial" else shear_modulus(link)
+    return modulus * cellwise(link, nodes, stiffness), link.material.density * cellwise(link, nodes, inertia)
 
 
-def second_moment(family: Family) -> Property:
-    """Return the second moment of area for bending of that family, m⁴."""
-    return (lambda s: s.I_yy) if family == "in-plane-bending" else (lambda s: s.I_zz)
+def second_moment(family: Family) -> str:
+    """Which second moment of area works in bending of that family."""
+    return "I_yy" if family == "in-plane-bending" else "I_zz"
 
 
-def cellwise(link: BeamLink, nodes: Array, quantity: Property) -> Array:
-    """Return a section property (e,), in its own unit, of each element between `nodes` (e + 1,), m."""
-    segment = np.searchsorted(link.geometry.breakpoints[1:-1], 0.5 * (nodes[1:] + nodes[:-1]))
-    return np.array([quantity(section) for section in link.sections])[segment]
+def cellwise(link: BeamLink, nodes: Array, name: str) -> Array:
+    """Return a property (e,) of `Section`, in its own unit, of each element between `nodes` (e + 1,), m."""
+    return section_property(link, 0.5 * (nodes[1:] + nodes[:-1]), name)
+
+
+def section_property(link: BeamLink, x: Array, name: str) -> Array:
+    """Return a property (k,) of `Section`, in its own unit, at x (k,), m; at a step of the section, beyond it."""
+    return np.array([getattr(section, name) for section in link.sections])[segments(link, x)]
+
+
+def segments(link: BeamLink, x: Array) -> Integers:
+    """Number of the segment at each x, m, of any shape; at a step of the section, of the one beyond it."""
+    return np.searchsorted(link.geometry.breakpoints[1:-1], x, side="right")
 
 
 ROUND_CORNERS = 16  # of the polygon that stands for a circle; divisible by 4

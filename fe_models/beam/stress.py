@@ -12,16 +12,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 
-from ...common.arrays import Array, Integers
+from ...common.arrays import Array
 from ..link_records.link import BeamLink
 from ..modal_body import Interface, Stations, StressPoint, craig_bampton
 from ..modal_body.attachment_modes import interface_loads
 from ..modal_body.lumped_masses import Lump, loads_with_lumps, lump_weights
 from ..modal_body.parts import through
 from ..modal_body.unit_loads import loads_at, unit_load_names
-from .invariants import ROTARY, of_load, of_tip_support, section_forces
+from .invariants import ROTARY, Rotary, of_load, of_tip_support, section_forces
 from .section_stress import section_stress
-from .sections import Property
+from .sections import section_property, segments
 
 
 def beam_stresses(
@@ -67,9 +67,9 @@ def beam_stresses(
     return points
 
 
-def _rotary(link: BeamLink) -> Sequence[tuple[Property, Sequence[float]]]:
+def _rotary(link: BeamLink) -> Rotary:
     """Inertia of sections that turn; Euler–Bernoulli beams have that of twisting alone."""
-    return ROTARY if link.model.theory == "timoshenko" else ((lambda s: s.I_p, (1.0, 0.0, 0.0)),)
+    return ROTARY if link.model.theory == "timoshenko" else {"I_p": (1.0, 0.0, 0.0)}
 
 
 def _of_inertia(link: BeamLink, stations: Stations, W: Array, x: float) -> Array:
@@ -86,17 +86,12 @@ def _of_inertia(link: BeamLink, stations: Stations, W: Array, x: float) -> Array
     half = 0.5 * (end - start)[:, None]
     s = (0.5 * (start + end)[:, None] + half * gauss).ravel()
     moved = through(stations, np.repeat(stations.element[element], gauss.size, axis=0), s)
-    sections = [link.sections[k] for k in segments(link, np.repeat(0.5 * (start + end), gauss.size))]
-    turning = sum(np.outer(inertia, [moment(one) for one in sections]) for moment, inertia in _rotary(link))
-    inertia = np.concatenate([np.tile([one.area for one in sections], (3, 1)), turning])
+    middle, rotary = np.repeat(0.5 * (start + end), gauss.size), _rotary(link)
+    turning = sum(np.outer(inertia, section_property(link, middle, name)) for name, inertia in rotary.items())
+    inertia = np.concatenate([np.tile(section_property(link, middle, "area"), (3, 1)), turning])
     motion = np.concatenate([moved.translation, moved.rotation], axis=1).transpose(1, 0, 2)
     load = (link.material.density * (half * weights).ravel() * inertia)[:, :, None] * motion @ W  # (6, q, n)
     forces = of_load(load[:, s > x], (s[s > x] - x)[:, None]).sum(axis=1)
     if link.reference.holds_root:
         return forces
     return forces + of_tip_support(link, np.array([x]), of_load(load, s[:, None]).sum(axis=1))
-
-
-def segments(link: BeamLink, x: Array) -> Integers:
-    """Number of the segment at each x, m, of any shape; at a step of the section, of the one beyond it."""
-    return np.searchsorted(link.geometry.breakpoints[1:-1], x, side="right")

@@ -8,7 +8,6 @@ need no more than ∫N_a ds and ∫x N_a ds of each shape function N_a. Work of 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,7 +17,6 @@ from dolfinx.mesh import Mesh, meshtags
 from mpi4py import MPI
 
 from ...common.arrays import Array
-from ...common.errors import SolveError
 from ...common.structs import struct
 from ...mesh.compat import compiled_form, function_space, lagrange_element, node_map
 from ...mesh.records import SurfacePatches
@@ -27,8 +25,6 @@ from ...mesh.solid_mesh import MeshTags
 from ..modal_body import OutlinedPatches
 from ..modal_body.parts import LEVI_CIVITA
 from .elasticity import SolidModel
-
-AREA_TOLERANCE = 1e-9
 
 
 @struct
@@ -152,7 +148,6 @@ def outlined_patches(
     record: SurfacePatches,
     length: float,
     modes: Array,
-    path: Path,
 ) -> OutlinedPatches:
     """Modal forces of piezoelectric patches outlined in the mesh; collective, the same on every process.
 
@@ -161,11 +156,9 @@ def outlined_patches(
     1/(1 − ν) times as large.
 
     `faces` has the tags, among `facet_tags`, of "patch/K/top" and "patch/K/bottom", K from 0, where the record has
-    them; `length` (m) is that of the link, `modes` (dofs, n) with ghosts. Raises `SolveError` where the facets of a
-    patch do not fill its outline.
+    them; `length` (m) is that of the link, `modes` (dofs, n) with ghosts.
     """
-    edges, mesh = record.edges(length), space.mesh
-    one, v, wanted = fem.Constant(mesh, 1.0), ufl.TestFunction(space), record.length * record.width
+    edges, mesh, v = record.edges(length), space.mesh, ufl.TestFunction(space)
     forces: dict[str, Array] = {}
     for side in ("top", "bottom") if record.faces == "both" else (record.faces,):
         rows: list[Array] = []
@@ -173,13 +166,6 @@ def outlined_patches(
             ds = _on_face(mesh, facet_tags, faces[f"patch/{k}/{side}"])
             work = [fem.assemble_vector(compiled_form(v[axis].dx(axis) * ds)).array for axis in (0, 2)]
             # What this process adds to others' degrees of freedom meets their ghosts in `modes`: the sum is complete.
-            own = np.append(np.array(work) @ modes, fem.assemble_scalar(compiled_form(one * ds)))
-            *row, area = mesh.comm.allreduce(own, op=MPI.SUM)
-            if not abs(area - wanted) <= AREA_TOLERANCE * wanted:
-                raise SolveError(
-                    f"{path}: surface_patch: the mesh does not follow the outline of patch {k + 1} on the {side} face: "
-                    f"its facets have {area:.9g} m2, length × width is {wanted:.9g} m2"
-                )
-            rows.append(np.reshape(row, (2, -1)))
+            rows.append(mesh.comm.allreduce(np.array(work) @ modes, op=MPI.SUM))
         forces[side], forces[f"{side}_across"] = np.stack(rows, axis=1)
     return OutlinedPatches(np.array(edges), record.width, **forces)

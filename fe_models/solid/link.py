@@ -110,7 +110,7 @@ def solid_modal_body(link: SolidLink, path: Path, progress: Progress, *, remesh:
     patches = None
     if link.surface_patch:
         of_faces = model.V, solid.facet_tags, solid.part.faces, link.surface_patch
-        patches = outlined_patches(*of_faces, length=link.geometry.length, modes=seen, path=path)
+        patches = outlined_patches(*of_faces, length=link.geometry.length, modes=seen)
     return modal_body_of(
         link,
         modes.omega2,

@@ -40,21 +40,19 @@ def stepped(theory, condition):
 def closed_forms(link, family):
     """K and M of the free beam: products of values at Gauss points, exact for piecewise cubics."""
 
-    def root(functions, quantity, derivative=0):
-        return functions.root(cellwise(link, NODES, quantity), derivative)
+    def of(name):
+        return cellwise(link, NODES, name)
 
-    W = lagrange(NODES, 3)
+    W, moment, rhoA = lagrange(NODES, 3), second_moment(family), RHO * of("area")
     if family in ("axial", "torsion"):
-        stiffness, inertia = rod_properties(link, family)
-        return gram(root(W, stiffness, 1)), gram(root(W, inertia))
-    moment = second_moment(family)
+        stiffness, inertia = rod_properties(link, family, NODES)
+        return gram(W.root(stiffness, 1)), gram(W.root(inertia))
     if link.model.theory == "euler-bernoulli":
         V = hermite(NODES)
-        return gram(root(V, lambda s: E * moment(s), 2)), gram(root(V, lambda s: RHO * s.area))
-    T, G = lagrange(NODES, 2), E / (2 * (1 + NU))
-    kGA = [root(W, lambda s: s.shear * G * s.area, 1), -root(T, lambda s: s.shear * G * s.area)]
-    strain = sp.bmat([[None, root(T, lambda s: E * moment(s), 1)], kGA], format="csr")
-    inertia = sp.block_diag([root(W, lambda s: RHO * s.area), root(T, lambda s: RHO * moment(s))], format="csr")
+        return gram(V.root(E * of(moment), 2)), gram(V.root(rhoA))
+    T, kGA = lagrange(NODES, 2), of("shear") * E / (2 * (1 + NU)) * of("area")
+    strain = sp.bmat([[None, T.root(E * of(moment), 1)], [W.root(kGA, 1), -T.root(kGA)]], format="csr")
+    inertia = sp.block_diag([W.root(rhoA), T.root(RHO * of(moment))], format="csr")
     return gram(strain), gram(inertia)
 
 
