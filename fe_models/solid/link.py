@@ -111,7 +111,7 @@ def solid_modal_body(link: SolidLink, path: Path, progress: Progress, *, remesh:
     if link.surface_patch:
         of_faces = model.V, solid.facet_tags, solid.part.faces, link.surface_patch
         patches = outlined_patches(*of_faces, length=link.geometry.length, modes=seen)
-    return modal_body_of(
+    body = modal_body_of(
         link,
         modes.omega2,
         modes.families,
@@ -127,6 +127,8 @@ def solid_modal_body(link: SolidLink, path: Path, progress: Progress, *, remesh:
         surface_patches=patches,
         remarks=tuple(solid.part.remarks),
     )
+    model.mass.matrix.destroy()  # PETSc keeps what Python alone lets go
+    return body
 
 
 def _materials(link: SolidLink, solid: SolidMesh, path: Path) -> MaterialMap:
