@@ -173,7 +173,7 @@ class Differentiation:
 
     def slopes(self, base: Evaluated, *, judged: bool = False) -> Slopes:
         """Return gradients at a completed design; `judged`: with an error estimate from further runs."""
-        wanted = [j for j, variable in enumerate(self.evaluations.space.variables) if not variable.is_catalogue]
+        wanted = self.evaluations.space.numbers
         if self.repeats and base.again is not None and wanted:
             slopes = self._by_repeated_steps(base, wanted, judged=judged or not self._tried)
             self._tried = True
@@ -293,12 +293,11 @@ class Optimality:
 
 def optimality(evaluations: Evaluations, design: Evaluated, slopes: Slopes) -> Optimality:
     """Return the conditions of optimality at a completed design, from the gradients there."""
-    problem, variables = evaluations.problem, evaluations.space.variables
+    problem = evaluations.problem
     factors = problem.factors(design.values)[:, None]
     scaled, excess = slopes.gradient * factors, problem.scaled(design.values)[1:]
-    is_number = np.array([not variable.is_catalogue for variable in variables])
-    free = np.flatnonzero(~np.isnan(scaled).any(axis=0) & is_number)
-    place, unit = np.array(design.place), np.eye(len(variables))
+    free = np.flatnonzero(~np.isnan(scaled).any(axis=0))
+    place, unit = np.array(design.place), np.eye(len(design.place))
     reached = np.flatnonzero(excess > -ACTIVE)
     low, high = (np.intersect1d(free, np.flatnonzero(near)) for near in (place < ACTIVE, place > 1.0 - ACTIVE))
     gradients = np.vstack([scaled[1 + reached], -unit[low], unit[high]])[:, free]

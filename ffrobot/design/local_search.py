@@ -71,8 +71,7 @@ class _Functions:
     ) -> None:
         self._differentiation, self._tell, self._judged, self._excess = differentiation, tell, judged, excess
         self._evaluations = differentiation.evaluations
-        variables, count = self._evaluations.space.variables, len(self._evaluations.problem.responses)
-        self._free = [j for j, variable in enumerate(variables) if not variable.is_catalogue]
+        self._free, count = self._evaluations.space.numbers, len(self._evaluations.problem.responses)
         self._tops, self._limits = ([*range(1, count)], []) if excess else ([0], [*range(1, count)])
         self._place, self.best, self._good = np.array(start.place), start, start
         self._gradients: dict[Place, Array] = {}
@@ -95,8 +94,9 @@ class _Functions:
         return np.array(sides)
 
     @property
-    def has_limits(self) -> bool:
-        return bool(self._limits) or self.has_level
+    def constraints(self) -> list[NonlinearConstraint]:
+        limits = NonlinearConstraint(self.excesses, -np.inf, 0.0, jac=self.excess_gradients)
+        return [limits] if self._limits or self.has_level else []
 
     def objective(self, x: Array) -> float:
         return float(x[-1]) if self.has_level else float(self._rows(x)[self._tops[0]])
@@ -247,7 +247,6 @@ def _pass(
     steps, is_slsqp = _Functions(differentiation, best, tell, judged=judged, excess=excess), optimizer == "slsqp"
     steps.shortest = SHORTEST if is_slsqp else 0.0
     low, high = steps.bounds.T
-    limits = NonlinearConstraint(steps.excesses, -np.inf, 0.0, jac=steps.excess_gradients)
     with suppress(ReachedError, StalledError):
         done = minimize(
             steps.objective,
@@ -255,7 +254,7 @@ def _pass(
             jac=steps.objective_gradient,
             method=optimizer,
             bounds=Bounds(low, high, keep_feasible=np.isfinite(low)),
-            constraints=[limits] if steps.has_limits else [],
+            constraints=steps.constraints,
             options={"maxiter": ITERATIONS, **({"ftol": FTOL} if is_slsqp else {"gtol": GTOL, "xtol": XTOL})},
         )
         has_ended_well = done.success if is_slsqp else done.status in (1, 2)

@@ -72,7 +72,7 @@ def find_optimum(
 
 
 def _method(space: DesignSpace, method: str, most: int) -> str:
-    catalogues, combined = any(v.is_catalogue for v in space.variables), combinations(space)
+    catalogues, combined = len(space.numbers) < len(space.variables), combinations(space)
     if method == "auto":
         return "slsqp" if not catalogues else "all" if 0 < combined <= min(EVERY, most) else "differential-evolution"
     if method in ("slsqp", "trust-constr") and catalogues:
@@ -131,7 +131,7 @@ def _search(
     else:
         message = evolve(evaluations, seed, starts[0] if starts else None, watcher.stage)
     first, best = evaluations.searched[0], best_of(evaluations, evaluations.searched)
-    if not best.completed or all(variable.is_catalogue for variable in evaluations.space.variables):
+    if not best.completed or not evaluations.space.numbers:
         return [Local(first, best, None, message)]
     local = search_from(best.place, "slsqp", differentiation, watcher)
     words = "; ".join(text for text in (message, local.message) if text)

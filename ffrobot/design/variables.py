@@ -104,6 +104,11 @@ class DesignSpace:
         """Keys of all variables, in order."""
         return tuple(key for variable in self.variables for key in variable.keys)
 
+    @property
+    def numbers(self) -> list[int]:
+        """Which variables are numbers between bounds."""
+        return [j for j, variable in enumerate(self.variables) if not variable.is_catalogue]
+
     def point(self, place: Place) -> Point:
         """Values of all keys at a point; exactly the scene's own where they equal them up to round-off."""
         return tuple(value for v, u in zip(self.variables, place, strict=True) for value in v.values(u))
