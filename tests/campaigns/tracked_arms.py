@@ -64,7 +64,7 @@ def own_changes(tables):
     links = [body["link"] for body in tables["body"] if "link" in body]
     shapes = [(of["geometry"]["length"], of["geometry"]["section"]) for of in links]
     sections = [(length, of["height"], of["width"]) for length, of in shapes]
-    (path,), is_3d, start = tables["trajectory"], tables["space"] == "spatial", tables["initial"]
+    (path,), is_3d, start = tables["trajectory"], tables.get("space") == "spatial", tables["initial"]
     texts = [path[axis] for axis in "xyz" if axis in path]
     angles = list(start["joints" if is_3d else "angles"].values())
     mass = sum(load["mass"] for load in tables.get("payload", ()))
