@@ -19,16 +19,7 @@ MAX_LITERAL = 1e100
 MAX_EXPONENT = 1000.0
 
 _NAMES = {"t": None, "pi": math.pi, "deg": math.pi / 180, "mm": 1e-3}
-_FUNCTIONS = {
-    "sin": Op.sin,
-    "cos": Op.cos,
-    "tan": Op.tan,
-    "exp": Op.exp,
-    "log": Op.log,
-    "sqrt": Op.sqrt,
-    "abs": Op.abs,
-    "tanh": Op.tanh,
-}
+_FUNCTIONS = {name: getattr(Op, name) for name in ("sin", "cos", "tan", "exp", "log", "sqrt", "abs", "tanh")}
 _OPERATORS: dict[type[ast.operator], Op] = {
     ast.Add: Op.add,
     ast.Sub: Op.subtract,

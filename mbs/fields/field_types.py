@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 from pydantic import AfterValidator, ValidationInfo
@@ -146,9 +146,14 @@ def _not_empty(entries: tuple[T, ...]) -> tuple[T, ...]:
     return entries
 
 
+def given_in(record: Record, keys: Iterable[str]) -> dict[str, Any]:
+    """The values of those `keys` that are set."""
+    return {key: value for key in keys if (value := getattr(record, key)) is not None}
+
+
 def one_of(record: Record, keys: tuple[str, ...]) -> str:
     """The one key of `keys` that is set. Raises `ValueError` when there is none or more than one."""
-    given = [key for key in keys if getattr(record, key) is not None]
+    given = [*given_in(record, keys)]
     if len(given) != 1:
         raise ValueError(f"expected exactly one of the keys {quoted(keys)}, found {quoted(given)}")
     return given[0]
@@ -156,15 +161,10 @@ def one_of(record: Record, keys: tuple[str, ...]) -> str:
 
 def only(record: Record, subject: str, allowed: tuple[str, ...], optional: tuple[str, ...]) -> list[str]:
     """Return the `optional` keys that are set. Raises `ValueError` unless all are `allowed` and one is given."""
-    given = [key for key in optional if getattr(record, key) is not None]
+    given = [*given_in(record, optional)]
     if not given or not set(given) <= set(allowed):
         raise ValueError(f'expected the keys {quoted(allowed)} with "{subject}", found {quoted(given)}')
     return given
-
-
-def present(**functions: TimeFunction | None) -> dict[str, TimeFunction]:
-    """Return the given functions by name, without None."""
-    return {name: function for name, function in functions.items() if function is not None}
 
 
 PointReference = Annotated[str, AfterValidator(_point)]

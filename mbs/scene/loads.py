@@ -6,7 +6,7 @@ from pydantic import ValidationInfo, model_validator
 
 from ...common.errors import quoted
 from .._core import TimeFunction
-from ..fields.field_types import Expression, Expressions, PointReference, Referring, one_of, only, present
+from ..fields.field_types import Expression, Expressions, PointReference, Referring, given_in, one_of, only
 from ..fields.functions import StateForce
 from ..fields.spelling import IN_SPACE, Spelled, is_planar, keys_here
 
@@ -63,11 +63,10 @@ class Load(Referring):
     def components(self) -> dict[str, TimeFunction]:
         """The given functions of time by component; of joints "moment[k]", of voltages "voltage[k]"."""
         if self.point is not None and self.moments:  # in the plane: about its normal
-            return present(x=self.x, y=self.y, mz=self.moments[0])
-        of_point = present(x=self.x, y=self.y, z=self.z, mx=self.mx, my=self.my, mz=self.mz)
+            return given_in(self, ("x", "y")) | {"mz": self.moments[0]}
         voltages = {f"voltage[{k}]": function for k, function in enumerate(self.voltage or ())}
         moments = {f"moment[{k}]": function for k, function in enumerate(self.moments)}
-        return of_point | moments | voltages
+        return given_in(self, OF_POINT) | moments | voltages
 
     @property
     def moments(self) -> tuple[TimeFunction, ...]:

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from functools import cached_property
 from itertools import pairwise
-from math import inf
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -25,9 +24,9 @@ from ..fields.field_types import (
     Referring,
     Vector3,
     WaypointTable,
+    given_in,
     one_of,
     only,
-    present,
 )
 from ..fields.orientations import QUATERNION, OrientationLaw, Reference, about_their_middle, orientation_of
 from ..fields.paths import SMOOTHNESS, Legs, PathLimits, Piecewise, impulses, path_of, shaped
@@ -217,10 +216,11 @@ class Trajectory(Referring):
                 raise ValueError(f'expected {count} numbers in "{key}", found {len(value)}')
         if self.fastest and "stretch" in self.model_fields_set:
             raise ValueError('expected one of the keys "fastest" and "stretch", found both')
-        if bool(self._limits) == (self.duration is not None):
-            given = "both" if self._limits else "neither"
+        limits = given_in(self, LIMITS)
+        if bool(limits) == (self.duration is not None):
+            given = "both" if limits else "neither"
             raise ValueError(f'expected either limits ({quoted(LIMITS)}) or a "duration" with "via", found {given}')
-        if self.profile in ("s-curve", "trapezoid") and self._limits == ["speed"]:
+        if self.profile in ("s-curve", "trapezoid") and [*limits] == ["speed"]:
             raise ValueError(f'expected "acceleration" or "jerk" with profile = "{self.profile}", found only "speed"')
         if self.profile == "trapezoid" and self.jerk is not None:
             raise ValueError('expected no "jerk" with profile = "trapezoid" (its acceleration jumps), found it')
@@ -241,7 +241,7 @@ class Trajectory(Referring):
             self._check_turns("waypoints")
 
     def _check_orientation(self) -> None:
-        keys = [key for key in ORIENTATIONS if getattr(self, key) is not None]
+        keys = given_in(self, ORIENTATIONS)
         if len(keys) > 1:
             raise ValueError(f"expected one orientation at most ({quoted(ORIENTATIONS)}), found {quoted(keys)}")
         beside_of = {"reference_rotation_vector": "rotation_vector", "tool_axis": "direction", "axis": "angle"}
@@ -257,7 +257,7 @@ class Trajectory(Referring):
         if self.duration is None:
             raise ValueError(
                 f'expected a "duration" with poses in via (limits in m/s say nothing of turning), found'
-                f" {quoted(self._limits)}"
+                f" {quoted(given_in(self, LIMITS))}"
             )
         self._check_turns("via")
 
@@ -266,10 +266,6 @@ class Trajectory(Referring):
             self._turns  # noqa: B018 (looked at for what it raises)
         except InputError as error:
             raise ValueError(f"{key}: {error}") from None
-
-    @property
-    def _limits(self) -> list[str]:
-        return [key for key in LIMITS if getattr(self, key) is not None]
 
     def _along_table(self, waypoints: Waypoints) -> Piecewise:
         if self.profile in (None, "spline"):
@@ -284,7 +280,7 @@ class Trajectory(Referring):
         profile, count = self.profile or "rest-to-rest", len(places) - 1
         start, duration = (self.start, self.duration) if times is None else (float(times[0]), np.diff(times))
         assert profile != "spline"
-        limits = PathLimits(*(inf if value is None else value for value in (self.speed, self.acceleration, self.jerk)))
+        limits = PathLimits(**given_in(self, LIMITS))
         durations = None if duration is None else tuple(np.broadcast_to(duration, count).tolist())
         holds = tuple(np.broadcast_to(self.hold, count - 1).tolist())
         smoothness = self.smoothness or SMOOTHNESS[profile]
@@ -327,7 +323,7 @@ class Trajectory(Referring):
     def components(self) -> dict[str, TimeFunction]:
         """The specified functions of time by component: "x", "y", "z", or "value"."""
         if self.path is None:
-            return present(x=self.x, y=self.y, z=self.z, value=self.value)
+            return given_in(self, (*PLACES, "value"))
         if self.waypoints is not None:
             names = tuple(name for name in self.waypoints.columns if name not in QUATERNION)
         else:
