@@ -149,13 +149,13 @@ class ClosedLoop(SampledAnalysis):
         filtering = filters(read, self.sample_time)
         every = ((model, feedback.behind(*filtering)) for model, feedback in found)
         loops = [loop for loop in every if eigenvalue_count(loop, self.sample_time, self.delay) <= MOST]
-        estimate, gears = None, bool(plant.tree.gears)
+        estimate = None
         if observed is not None:
             true = ideal.read(*np.split(np.array(states[: loop.taken]), [n_q, rates], axis=1)).T
             estimate = observed.record(dict(zip([each.name for each in estimated], true, strict=True)))
         with run.arithmetic:
             error = np.linalg.norm(_position(run.model, run.q, tip) - place_at(run.time), axis=1)
-            record = loop_record(self, setup, loop, acting, motion, loops=loops, lowest=lowest, gears=gears)
+            record = loop_record(self, setup, loop, acting, motion, loops=loops, lowest=lowest)
         record = replace(record, tip_error=error, feedback=along, estimate=estimate)
 
         def completed(of: Run) -> Run:

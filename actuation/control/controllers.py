@@ -41,7 +41,7 @@ from .linear_model import (
 )
 from .records import ComputedTorque, JointPid, Lqr, ModalVelocity, StateFeedback
 from .records import Controller as Record
-from .robot import RigidArm, Setup, estimate
+from .robot import Setup, estimate
 
 
 class Controller(Protocol):
@@ -62,14 +62,13 @@ class LinearFeedback:
     def __init__(
         self,
         setup: Setup,
-        P: Array | None,
+        P: Array,
         D: Array | None = None,
         integral: Array | None = None,
         bandwidth: float = 0.0,
     ) -> None:
         self.reference, self.T, self.bandwidth = setup.reference, setup.sample_time, bandwidth
-        self.P = P if P is not None else np.zeros((len(setup.inputs), len(setup.outputs)))
-        self.D, self.integral = D, integral
+        self.P, self.D, self.integral = P, D, integral
         self.before: Array | None = None
         self.sum = np.zeros(len(setup.outputs))
 
@@ -91,8 +90,7 @@ def joint_pid(record: JointPid, setup: Setup) -> LinearFeedback:
     mobility = np.zeros(len(setup.robot.motors))  # 1/(kg·m²) or 1/kg, acceleration of each joint per torque
     if setup.robot.motors_fit:
         mobility = setup.robot.rigid().mobility()
-    shape = (len(setup.inputs), len(setup.outputs))
-    P, D, integral = (np.zeros(shape) for _ in range(3))
+    P, D, integral = np.zeros((3, len(setup.inputs), len(setup.outputs)))
     bandwidth = 0.0
     for joint, name in setup.robot_coordinates(record.joints):
         (u,), (y,) = setup.places(f"joint/{name}"), setup.columns(f"{record.side}/{name}")
@@ -122,7 +120,7 @@ def modal_velocity(record: ModalVelocity, setup: Setup) -> LinearFeedback:
         damping = link.gain[:, :m] * (2 * record.damping_ratio * link.omega[:m])
         G[np.ix_(setup.patch_places(name), columns)] = damping @ modes
         bandwidth = max(bandwidth, float(link.omega[m - 1]))
-    P, D = (None, G) if record.sensor == "pzt" else (G, None)
+    P, D = (np.zeros_like(G), G) if record.sensor == "pzt" else (G, None)
     return LinearFeedback(setup, P, D, bandwidth=bandwidth)
 
 
@@ -144,9 +142,10 @@ def state_feedback(record: StateFeedback, setup: Setup) -> LinearFeedback:
 class ComputedTorqueControl:
     """Torques for γ̈_ref + 2 ζ ω ė + ω² e with rigid links, less the feed-forward (Craig, Intro. to Robotics, 10.4)."""
 
-    def __init__(self, record: ComputedTorque, setup: Setup, arm: RigidArm) -> None:
-        motors = setup.robot.motors
-        self.arm, self.bandwidth = arm, record.bandwidth
+    def __init__(self, record: ComputedTorque, setup: Setup) -> None:
+        motors, is_geared = setup.robot.motors, bool(setup.robot.elastic_joints)
+        self.arm, self.bandwidth = setup.robot.rigid(), record.bandwidth
+        self.warnings = ["the controller is designed for rigid gears, but some are compliant"] * is_geared
         self.gains = record.bandwidth**2, 2 * record.damping_ratio * record.bandwidth
         self.values = setup.columns(*(f"joint/{name}" for name in motors))
         self.rates = setup.columns(*(f"joint/{name}/rate" for name in motors))
@@ -233,7 +232,7 @@ def make_controllers(records: Sequence[Record], setup: Setup) -> list[Controller
         elif isinstance(record, StateFeedback):
             made.append(state_feedback(record, setup))
         elif isinstance(record, ComputedTorque):
-            made.append(ComputedTorqueControl(record, setup, setup.robot.rigid()))
+            made.append(ComputedTorqueControl(record, setup))
         elif isinstance(record, Lqr):
             made.append(LqrControl(record, setup, [other for other in records if isinstance(other, JointPid)]))
         else:

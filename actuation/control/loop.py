@@ -28,7 +28,7 @@ from .metrics import (
     watched,
 )
 from .observer import Estimates
-from .records import ComputedTorque, JointPid, SampledAnalysis
+from .records import JointPid, SampledAnalysis
 from .robot import Setup
 from .signals import Filter, Signal
 
@@ -246,17 +246,16 @@ def loop_record(
     *,
     loops: Loops,
     lowest: float,
-    gears: bool,
 ) -> LoopRecord:
     """Return the record of a run at its outputs and between; linear `loops` about the reference.
 
-    `lowest`: as in `measure`. `gears`: whether some are compliant.
+    `lowest`: as in `measure`.
     """
     taken = slice(loop.taken)
     T, delay = analysis.sample_time, analysis.delay
     found = margins(loops, T, delay) if loops else None
     metrics = measure(run, setup, loop, lowest, None if found is None else found.is_stable)
-    warnings = tuple(_warnings(analysis, acting, metrics, found, gears))
+    warnings = tuple(_warnings(analysis, acting, metrics, found))
     pids = [controller for controller in analysis.controller if isinstance(controller, JointPid)]
     texts: list[str] = []
     if found is not None and metrics.verdict not in CALM:
@@ -279,7 +278,7 @@ def loop_record(
 
 
 def _warnings(
-    analysis: SampledAnalysis, controllers: Sequence[Controller], metrics: Metrics, found: Margins | None, gears: bool
+    analysis: SampledAnalysis, controllers: Sequence[Controller], metrics: Metrics, found: Margins | None
 ) -> list[str]:
     lines = [line for controller in controllers for line in getattr(controller, "warnings", ())]
     fastest = max((controller.bandwidth for controller in controllers), default=0.0)
@@ -289,8 +288,6 @@ def _warnings(
             f"sampling at {sampling / (2 * np.pi):.4g} Hz is slow for a controller that acts up to"
             f" {fastest / (2 * np.pi):.4g} Hz: expected at least {SAMPLES_PER_PERIOD} samples a period"
         )
-    if gears and any(isinstance(record, ComputedTorque) for record in analysis.controller):
-        lines.append("the controller is designed for rigid gears, but some are compliant")
     if metrics.verdict not in CALM:
         by_model = "" if found is None else f" (largest |eigenvalue| of the sampled linear loop: {found.radius:.6g})"
         why = ": gains too high for sampling and delay, or for the links?" if controllers else ""

@@ -163,8 +163,11 @@ def _plant(
     delay: float,
 ) -> tuple[SampledModel, Array]:
     """The sampled plant, and the readings of its states: those of a loop whatever its gains are."""
-    seen, felt = _readings(model, outputs)
-    columns = model.inputs(inputs)
+    columns, f = model.inputs(inputs), model.freedom
+    read = [name if name in model.output_names else name.removesuffix("/rate") for name in outputs]
+    is_rate, rows = np.array(read) != outputs, model.outputs(read)
+    seen, felt = model.C[rows], model.D[rows]
+    seen[is_rate, f:], seen[is_rate, :f], felt[is_rate] = seen[is_rate, :f], 0.0, 0.0
     lag, wait = np.zeros((2, len(columns))) if late is None else np.array(late)
     slow = np.flatnonzero(lag)
     A, B, n = model.A, model.B[:, columns], len(model.A)
@@ -178,18 +181,6 @@ def _plant(
         places[slow] = n + np.arange(len(slow))
         y[:, places] = felt[:, columns]
     return plant, y
-
-
-def _readings(model: LinearModel, names: Sequence[str]) -> tuple[Array, Array]:
-    """What sensors read of states (readings, 2f), and of inputs (readings, inputs)."""
-    f, seen, felt = model.freedom, np.zeros((len(names), len(model.A))), np.zeros((len(names), model.B.shape[1]))
-    for row, name in enumerate(names):
-        if name in model.output_names:
-            k = model.outputs(name)[0]
-            seen[row], felt[row] = model.C[k], model.D[k]
-        else:
-            seen[row, f:] = model.C[model.outputs(name.removesuffix("/rate"))[0], :f]
-    return seen, felt
 
 
 def margins(loops: Loops, T: float, delay: float) -> Margins:

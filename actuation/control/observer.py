@@ -19,7 +19,6 @@ from ...common.arrays import Array, ComplexArray
 from ...common.errors import InputError, SolveError, quoted
 from ...common.libraries import scipy
 from ...common.structs import struct
-from ...mbs.model.gears import with_compliance
 from ..context import ActuatedContext
 from .controllers import Controller, LinearFeedback, make_controllers
 from .linear_model import LinearModel, kept_modes, observability, riccati, sampled, state_space, zero_order_hold
@@ -365,7 +364,7 @@ def model_of_filter(record: FilterRecord, robot: ControlledRobot, row: int, sign
     Its links have their lowest modes alone; forces that `record` names are inputs, too.
     """
     mechanism = kept_modes(robot.linear(row, record.points), record.modes)
-    return state_space(mechanism, readings_at(with_compliance(robot.model), mechanism, signals))
+    return state_space(mechanism, readings_at(robot.plant, mechanism, signals))
 
 
 def kalman_filters(
@@ -380,8 +379,7 @@ def kalman_filters(
     Raises `InputError` as `kalman` does.
     """
     robot, source, T = setup.robot, setup.source, setup.sample_time
-    plant = with_compliance(robot.model)
-    read, estimated = (make_signals(plant, context, of) for of in (sensors, more))
+    read, estimated = (make_signals(robot.plant, context, of) for of in (sensors, more))
     wanted = merged(estimated, ())
     names, signals = [signal.name for signal in wanted], (*read, *wanted)
     at = [record.time] if isinstance(record, KalmanObserver) else np.linspace(0, source.time[-1], record.count)

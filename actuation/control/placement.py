@@ -24,7 +24,6 @@ from ...common.validation import Record
 from ...mbs.analysis.operating_points import InstantAnalysis, find_operating_points, of_earlier, row_at
 from ...mbs.fields.field_types import ModeCount, Name, PatchCount, PointReference, Positive, Reference, under
 from ...mbs.linear.linearisation import LinearEquations
-from ...mbs.model.gears import with_compliance
 from ...mbs.model.system import motor_forces
 from ...mbs.run.gears import supplied_in
 from ...mbs.run.record import Details, Run
@@ -386,8 +385,7 @@ def _deviation(
     """
     key, robot = f"{context.model.scene.path}: placement.estimate", whole_robot(context, run)
     tip = Sensor(point=record.tip or default_tip(robot.model))
-    plant = with_compliance(robot.model)
-    read, wanted = (make_signals(plant, context, of) for of in (record.sensor, (tip,)))
+    read, wanted = (make_signals(robot.plant, context, of) for of in (record.sensor, (tip,)))
     known = model_of_filter(record, robot, 0, [*read, *wanted])
     layout, tree = link.array.layout, robot.model.tree
     own = link.array.modes.coordinates(tree.nodes[tree.index[layout.body]].body.modal_transform.T).T

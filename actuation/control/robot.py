@@ -144,6 +144,11 @@ class ControlledRobot:
     of_links: Mapping[str, LinkPatches]  # patches by link
     source: Run  # the inverse analysis
 
+    @cached_property
+    def plant(self) -> Model:
+        """The robot with its compliant gears."""
+        return with_compliance(self.model)
+
     @property
     def path(self) -> Path:
         """Path of the scene file."""
@@ -193,11 +198,10 @@ class ControlledRobot:
 
     def linear(self, row: int, points: Mapping[str, str] = MappingProxyType({})) -> LinearMechanism:
         """Linearize about output `row` of the motion, with `points` as in `LinearEquations`; voltages are inputs."""
-        plant = with_compliance(self.model)
-        moved = with_motor_coordinates(self.source, plant)
-        linearisation = LinearEquations(plant, moved.q[row], points)
+        moved = with_motor_coordinates(self.source, self.plant)
+        linearisation = LinearEquations(self.plant, moved.q[row], points)
         found = linearisation.at(float(self.source.time[row]), moved.q[row], moved.v[row], moved.a[row])
-        return with_voltages(plant, found, self.of_links)
+        return with_voltages(self.plant, found, self.of_links)
 
     def rigid(self) -> RigidArm:
         """Return the robot with rigid links at the start. Raises `InputError` if motors do not fit the mechanism."""
