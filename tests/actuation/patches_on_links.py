@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ffrobot.actuation.patches.link_patches import link_patches
+from ffrobot.actuation.patches.composite import patched_body
+from ffrobot.actuation.patches.link_patches import link_patches, placed_patches
 from ffrobot.actuation.patches.records import PztLayout
 from ffrobot.mbs.model.body import from_modal_body
 from ffrobot.mbs.model.projection import projected
@@ -16,6 +17,12 @@ CERAMIC = {"length": 0.05, "width": 0.025, "thickness": 0.75e-3, "modulus": 63e9
 def planar_body(body, name="link"):
     """The modes of a link that move in the plane."""
     return projected(from_modal_body(name, body, is_planar=True))
+
+
+def patched(body, *layouts, bare=None):
+    """The link, in 3D unless `bare` is given, with mass and stiffness of its patches."""
+    bare = from_modal_body("link", body) if bare is None else bare
+    return patched_body(bare, body, placed_patches(SCENE, layouts, body))
 
 
 def layout(body="link", **keys):

@@ -1,13 +1,12 @@
 """Amplifiers of patches: responses in closed form, currents by charges, and limits in tracking, replays and loops."""
 
-import re
-from pathlib import Path
-
 import numpy as np
 import pytest
+import test_tracking_arms
 from beam_links import paper_link
 from one_link import one_link
 from patches_on_links import layout
+from test_tracking_arms import off_path
 
 import ffrobot
 from ffrobot.common.errors import SolveError
@@ -15,7 +14,6 @@ from ffrobot.run.solve import prepare_scene
 
 pytestmark = pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
 
-PAGE = Path(__file__).parents[2] / "docs" / "howto" / "tracking.md"
 TIME = np.linspace(0.0, 0.01, 1001)
 HYSTERESIS = {"weights": (0.8, 0.1, 0.06, 0.04), "thresholds": (0.0, 10.0, 30.0, 55.0)}
 
@@ -57,27 +55,18 @@ def test_no_limit_of_current_takes_no_capacitance():
     np.testing.assert_array_equal(amplifiers.output(TIME, wanted, wanted), amplifiers.hysteresis.output(wanted))
 
 
-@pytest.fixture
-def solved(tmp_path):
-    """The soft arm of the page on tracking with an amplifier, its text changed by pairs; `alone`: without replays."""
-    blocks = dict(re.findall(r"`(\w+\.toml)`:\n\n```toml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL))
+scene = test_tracking_arms.scene  # the soft arm of the page
 
-    def solve(amplifier, *changes, limit="limit = 200.0", alone=False):
-        for name, text in blocks.items():
-            for old, new in (("limit = 200.0 ", f"{limit}\n[pzt.amplifier]\n{amplifier}\n#"), *changes):
-                assert old in text or name != "scene.toml"
-                text = text.replace(old, new)
-            if alone and name == "scene.toml":
-                text = text[: text.index("[[analysis]]", text.index('name = "carried"'))]
-            (tmp_path / name).write_text(text, encoding="utf-8")
-        return ffrobot.solve(tmp_path / "scene.toml")
+
+@pytest.fixture
+def solved(scene):
+    """With an amplifier, its text changed by pairs; `alone`: without replays."""
+
+    def solve(amplifier, *changes, limit="limit = 200.0", **keys):
+        amplified = "limit = 200.0 ", f"{limit}\n[pzt.amplifier]\n{amplifier}\n#"
+        return ffrobot.solve(scene(amplified, *changes, **keys))
 
     return solve
-
-
-def off_path(results, name):
-    found, wanted = (results[f"{of}/points/arm.tip/position"] for of in (name, "carried"))
-    return float(np.abs(found - wanted).max())
 
 
 def test_currents_of_tracking(solved):

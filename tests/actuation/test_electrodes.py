@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from beam_links import beam_link, modal_body, rectangle
 from one_link import one_link
-from patches_on_links import SCENE
+from patches_on_links import SCENE, patched
 
 import ffrobot
 from ffrobot.actuation.control.signals import volts_on_file
-from ffrobot.actuation.patches.composite import patched_body
-from ffrobot.actuation.patches.link_patches import link_patches, placed_patches
+from ffrobot.actuation.patches.link_patches import link_patches
 from ffrobot.actuation.patches.records import PztLayout
 from ffrobot.common.errors import InputError
 from ffrobot.common.validation import validate
@@ -33,9 +32,8 @@ def strip():
     return modal_body(LINK)
 
 
-def patched(strip, **keys):
-    layout = validate(PztLayout, PATCH | keys, SCENE)
-    return patched_body(from_modal_body("strip", strip), strip, placed_patches(SCENE, [layout], strip))
+def layout(**keys):
+    return validate(PztLayout, PATCH | keys, SCENE)
 
 
 def test_open_patches_along_a_cantilever_under_a_force_at_its_tip(strip):
@@ -45,7 +43,7 @@ def test_open_patches_along_a_cantilever_under_a_force_at_its_tip(strip):
     C = A * L / T_P**2 * (EPS - E_P * D31**2)
     V = -c * L**2 / 2 / (C * EI + c**2 * L)
     for electrodes, expected in (("shorted", L**3 / 3 / EI), ("open", (L**3 / 3 + c * V * L**2 / 2) / EI)):
-        body = patched(strip, electrodes=electrodes)
+        body = patched(strip, layout(electrodes=electrodes))
         tip = body.points["tip"].translation[1]
         assert tip**2 @ (1.0 / body.stiffness) == pytest.approx(expected, rel=1e-6)
 
@@ -53,7 +51,7 @@ def test_open_patches_along_a_cantilever_under_a_force_at_its_tip(strip):
 @pytest.mark.parametrize("share", [0.3, 1.0, 4.0])
 def test_resistor_against_the_charge_as_a_state(strip, share):
     """R q̇ + (q − Φᵀp)/C = 0; the stiffness and damping of each mode's own frequency miss it by (k² of it)²."""
-    shorted, opened = (patched(strip, electrodes=of, **PLACE) for of in ("shorted", "open"))
+    shorted, opened = (patched(strip, layout(electrodes=of, **PLACE)) for of in ("shorted", "open"))
     omega = np.sqrt(shorted.stiffness)
     T = np.linalg.lstsq(opened.modal_transform, shorted.modal_transform, rcond=None)[0]
     values, vectors = np.linalg.eigh(T.T @ np.diag(opened.stiffness) @ T - np.diag(shorted.stiffness))
@@ -70,9 +68,9 @@ def test_resistor_against_the_charge_as_a_state(strip, share):
     )
     exact = np.linalg.eigvals(A)
     exact = exact[np.argsort(np.abs(exact - 1j * omega[0]))[0]]
-    driven = link_patches(SCENE, [validate(PztLayout, PATCH | PLACE, SCENE)], strip, shorted)
+    driven = link_patches(SCENE, [layout(**PLACE)], strip, shorted)
     C = np.sum((shorted.modal_transform.T @ driven.Phi_V[:, 0]) ** 2) / (Phi @ Phi)
-    body = patched(strip, shunt=lag / C, **PLACE)
+    body = patched(strip, layout(shunt=lag / C, **PLACE))
     Z, I = np.zeros((n, n)), np.eye(n)  # noqa: E741
     found = np.linalg.eigvals(np.block([[Z, I], [-np.diag(body.stiffness), -body.damping]]))
     found = found[np.argsort(np.abs(found - 1j * omega[0]))[0]]
@@ -88,10 +86,9 @@ def test_readings_of_a_patch_under_a_force_at_the_tip(electrodes, face, offset, 
     """q = ∫ f·e dx of the composite section under the moments of the force, by however few modes; V = q/C."""
     w, force, keys = 0.008, np.array([0.0, 1.0, 0.5]), {"count": count, "family": "all"}
     body = modal_body(LINK | {"modes": keys})
-    layout = PATCH | PLACE | {"width": w, "face": face, "offset": offset, "electrodes": electrodes}
-    placed = placed_patches(SCENE, [layout := validate(PztLayout, layout, SCENE, None, "spatial")], body)
-    spatial = patched_body(from_modal_body("strip", body), body, placed)
-    volts = volts_on_file(link_patches(SCENE, [layout], body, spatial), "strip")["strip"] @ spatial.modal_transform
+    keys = PATCH | PLACE | {"width": w, "face": face, "offset": offset, "electrodes": electrodes}
+    spatial = patched(body, one := validate(PztLayout, keys, SCENE, None, "spatial"))
+    volts = volts_on_file(link_patches(SCENE, [one], body, spatial), "strip")["strip"] @ spatial.modal_transform
     found = volts[0] @ (force @ spatial.points["tip"].translation / spatial.stiffness)
     faces, sign = (2, 0.0) if face == "both" else (1, 1.0)
     A, arm, I = (faces * w * np.diff([(H / 2) ** k, (H / 2 + T_P) ** k])[0] / k for k in (1, 2, 3))  # noqa: E741
@@ -111,10 +108,9 @@ def test_voltages_leave_out_passive_patches(strip):
     """Whatever is asked, they get none, and nothing drives the link."""
     spatial = from_modal_body("strip", strip)
     driven, open_ = (
-        validate(PztLayout, PATCH | {"name": name, "centers": [x], "length": 0.1, "allocation": "least-squares"} | keys,
-                 SCENE)
+        layout(name=name, centers=[x], length=0.1, allocation="least-squares", **keys)
         for name, x, keys in (("driven", 0.06, {}), ("sensor", 0.2, {"electrodes": "open"}))
-    )  # fmt: skip
+    )
     alone, both = (link_patches(SCENE, layouts, strip, spatial) for layouts in ([driven], [driven, open_]))
     only = link_patches(SCENE, [open_], strip, spatial)
     F_p = np.ones((1, strip.mode_count))
@@ -140,7 +136,7 @@ def test_voltages_leave_out_passive_patches(strip):
 )
 def test_contradictions(keys, message):
     with pytest.raises(InputError, match=message):
-        validate(PztLayout, PATCH | keys, SCENE)
+        layout(**keys)
 
 
 def test_voltages_for_passive_patches_are_refused():

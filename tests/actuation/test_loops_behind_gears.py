@@ -37,10 +37,10 @@ def test_gears_that_give_are_wound_at_the_start():
 def test_a_motor_behind_a_spring_is_its_two_masses():
     """P on the motor of a free wheel: γ of a step in the reference rate against the two masses, sampled finely."""
     I_m, k, c, P, D, T_fine = 1e-4 * 50.0**2, 2e3, 1.0, 200.0, 10.0, 1e-4
-    scene = wheel(
-        loop(controller=[ON_MOTORS], sample_time=T_fine, disturbance=blow(), feed_forward="none"), joint=GIVES
-    )
-    solution = solve_scene(scene)
+    on_motor = loop(controller=[ON_MOTORS], sample_time=T_fine, disturbance=blow(), feed_forward="none")
+    rigid = loop("rigid", controller=[{"kind": "computed-torque", "bandwidth": 5.0}])
+    solution = solve_scene(wheel(on_motor, rigid, joint=GIVES))
+    assert solution.outcomes["rigid"].details.warnings[0].endswith("designed for rigid gears, but some are compliant")
     outcome, (angle, _) = solution.outcomes["loop"], joint_motion(solution.analyses["loop"].run, "O")
     # x = (θ_m, γ, rates); the blow is a moment of 5 N times 0.3 m on the wheel for 0.1 s, which turns by little
     M, K = np.diag([I_m, INERTIA]), np.array([[k + P, -k], [-k, k]])

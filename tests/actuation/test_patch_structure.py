@@ -3,17 +3,12 @@
 import numpy as np
 import pytest
 from beam_links import modal_body, paper_link, rectangle
-from patches_on_links import SCENE, layout, planar_body
+from patches_on_links import layout, patched, planar_body
 
-from ffrobot.actuation.patches.composite import patched_body, structure_effect_of
-from ffrobot.actuation.patches.link_patches import placed_patches
+from ffrobot.actuation.patches.composite import structure_effect_of
 
 E, RHO, H, B = 2.068427e11, 7850.0, 0.015, 0.025
 E_P, RHO_P, T_P = 63e9, 7600.0, 0.75e-3
-
-
-def with_patches(bare, body, **keys):
-    return patched_body(bare, body, placed_patches(SCENE, [layout(density=RHO_P, **keys)], body))
 
 
 def composite_link(faces, mass, stiffness):
@@ -34,21 +29,15 @@ def composite_link(faces, mass, stiffness):
     )
 
 
-def ritz_stiffness(bare, patched):
-    """K with patches in the modes of the bare link."""
-    back = np.linalg.inv(bare.modal_transform.T @ patched.modal_transform)
-    return back.T @ np.diag(patched.stiffness) @ back
-
-
 @pytest.mark.parametrize("face", [None, "both"])
 @pytest.mark.parametrize("structural", [("mass",), ("stiffness",), ("mass", "stiffness")])
 def test_frequencies_are_those_of_the_composite_link(cantilever, face, structural):
     """Ritz with 20 modes of the bare link: curvature has steps at patch edges that smooth modes only come near."""
     body = cantilever(20)
     bare = planar_body(body)
-    patched = with_patches(bare, body, face=face, structural=structural)
+    stiffer = patched(body, layout(density=RHO_P, face=face, structural=structural), bare=bare)
     reference = composite_link(2 if face else 1, "mass" in structural, "stiffness" in structural)
-    effect = structure_effect_of(bare, patched)
+    effect = structure_effect_of(bare, stiffer)
     ritz, exact = effect.frequency[1, :5], reference.frequency[:5]
     assert np.all(ritz > exact * (1 - 1e-9))  # Rayleigh's principle
     np.testing.assert_allclose(ritz, exact, rtol=1e-3)
@@ -56,18 +45,19 @@ def test_frequencies_are_those_of_the_composite_link(cantilever, face, structura
         np.testing.assert_allclose(ritz / effect.frequency[0, :5] - 1, exact / effect.frequency[0, :5] - 1, rtol=0.04)
     assert effect.mass[1] == pytest.approx(reference.mass, rel=1e-12)
     assert effect.inertia[1] == pytest.approx(reference.second_moment[0, 0], rel=1e-12)
-    np.testing.assert_allclose(patched.first_moment[:2], reference.first_moment[:2], atol=1e-12)
-    np.testing.assert_allclose(np.abs(patched.S_bar[1, :5]), np.abs(reference.S_bar[1, :5]), rtol=2e-3)
+    np.testing.assert_allclose(stiffer.first_moment[:2], reference.first_moment[:2], atol=1e-12)
+    np.testing.assert_allclose(np.abs(stiffer.S_bar[1, :5]), np.abs(reference.S_bar[1, :5]), rtol=2e-3)
 
 
 def test_modes_stay_orthonormal_and_the_transform_goes_back(cantilever):
     """Φ of the patched link is Φ of the file times the transform; its invariants are sums over the same points."""
     body = cantilever(10)
     bare = planar_body(body)
-    patched = with_patches(bare, body, structural=("mass", "stiffness"))
-    tip = body.interfaces["tip"].translation[:2] @ patched.modal_transform
-    np.testing.assert_allclose(patched.points["tip"].translation[:2], tip, atol=1e-12)
-    np.testing.assert_allclose(patched.S_bar_kl[0, 0] + patched.S_bar_kl[1, 1], np.eye(10), atol=1e-12)
-    K = ritz_stiffness(bare, patched)
+    stiffer = patched(body, layout(density=RHO_P, structural=("mass", "stiffness")), bare=bare)
+    tip = body.interfaces["tip"].translation[:2] @ stiffer.modal_transform
+    np.testing.assert_allclose(stiffer.points["tip"].translation[:2], tip, atol=1e-12)
+    np.testing.assert_allclose(stiffer.S_bar_kl[0, 0] + stiffer.S_bar_kl[1, 1], np.eye(10), atol=1e-12)
+    back = np.linalg.inv(bare.modal_transform.T @ stiffer.modal_transform)  # to modes of the bare link
+    K = back.T @ np.diag(stiffer.stiffness) @ back
     gain = K - np.diag(bare.stiffness)
     assert np.linalg.eigvalsh(gain).min() > -1e-9 * np.abs(gain).max()

@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from beam_links import beam_link, modal_body, rectangle, tube
-from patches_on_links import SCENE
+from patches_on_links import SCENE, patched
 
-from ffrobot.actuation.patches.composite import patched_body
-from ffrobot.actuation.patches.link_patches import check_reach, link_patches, placed_patches
+from ffrobot.actuation.patches.link_patches import check_reach, link_patches
 from ffrobot.actuation.patches.records import PztLayout, fibre_lamina, plain_lamina
 from ffrobot.common.errors import InputError
 from ffrobot.common.validation import validate
@@ -38,13 +37,9 @@ def layout(**keys):
     return validate(PztLayout, material | tables, SCENE)
 
 
-def patched(body, layouts):
-    return patched_body(from_modal_body("link", body), body, placed_patches(SCENE, layouts, body))
-
-
 def tip(body, layouts, volts=None):
     """Φp (3,) and Φ_r p (3,) of the tip under a voltage on all patches, statically, with what the patches stiffen."""
-    spatial = patched(body, layouts)
+    spatial = patched(body, *layouts)
     found = link_patches(SCENE, layouts, body, spatial)
     V = np.full(found.Phi_V.shape[1], VOLT) if volts is None else np.asarray(volts, dtype=float)
     p = spatial.modal_transform.T @ (found.Phi_V @ V) / spatial.stiffness
@@ -200,7 +195,7 @@ def test_overlap_of_layouts_is_shared():
 def test_round_links_do_not_mix_their_planes():
     """Frequencies in the two planes are equal; patches in one leave the other's modes alone, payload or not."""
     body = link(TUBE)
-    spatial = patched(body, [layout(structural=True, density=7600.0)])
+    spatial = patched(body, layout(structural=True, density=7600.0))
     families = np.array(body.family)
     assert not spatial.modal_transform[families[:, None] != families].any()
 
@@ -209,7 +204,7 @@ def test_mass_of_layers():
     """∫ρ(y² + z²) over the layers; modes stay orthonormal."""
     body = link(SQUAT)
     keys = {"count": 5, "length": 0.05, "structural": True, "density": 7600.0, "face": "both"}
-    spatial = patched(body, [layout(**keys)])
+    spatial = patched(body, layout(**keys))
     A, I = 2 * WIDE * 0.5e-3, 2 * WIDE * (0.0035**3 - 0.003**3) / 3  # noqa: E741
     assert spatial.mass - body.mass == pytest.approx(5 * 0.05 * 7600.0 * A, rel=1e-9)
     layers = 5 * 0.05 * 7600.0 * (I + A * WIDE**2 / 12)

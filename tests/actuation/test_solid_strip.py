@@ -3,14 +3,12 @@
 import numpy as np
 import pytest
 from beam_links import beam_link, modal_body, rectangle
-from patches_on_links import SCENE
+from patches_on_links import SCENE, patched
 from solid_strip import SolidStrip
 
-from ffrobot.actuation.patches.composite import patched_body
-from ffrobot.actuation.patches.link_patches import link_patches, placed_patches
+from ffrobot.actuation.patches.link_patches import link_patches
 from ffrobot.actuation.patches.records import PztLayout
 from ffrobot.common.validation import validate
-from ffrobot.mbs.model.body import from_modal_body
 
 STRIP = {"size": (0.4, 0.003, 0.02), "E": 70e9, "nu": 0.33, "rho": 2700.0}
 CERAMIC = {"E": 61e9, "nu": 0.35, "rho": 7700.0, "d31": -179e-12, "permittivity": 1700 * 8.8541878128e-12}
@@ -47,7 +45,7 @@ def test_one_patch_on_a_strip(strip, name, close, of_charge):
         "poissons_ratio": CERAMIC["nu"], "permittivity": CERAMIC["permittivity"], "structural": True,
     }  # fmt: skip
     layouts = [validate(PztLayout, keys | of, SCENE) for of in ({}, {"electrodes": "open"})]
-    bodies = [patched_body(from_modal_body("link", strip), strip, placed_patches(SCENE, [of], strip)) for of in layouts]
+    bodies = [patched(strip, of) for of in layouts]
     shorted, opened = (np.sqrt(body.stiffness.min()) / (2 * np.pi) for body in bodies)
     found = solid.frequency("shorted"), solid.frequency("open")
     assert shorted == pytest.approx(found[0], rel=0.005)

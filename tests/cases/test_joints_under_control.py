@@ -40,16 +40,11 @@ def scene(kind, turned):
         "controller": [{"kind": "joint-pid", "proportional": {"J": 60.0}, "derivative": {"J": 2.0}}],
         "tolerance": 1e-9,
     }  # fmt: skip
-    torque = loop | {
-        "name": "torque",
-        "feed_forward": "none",
-        "controller": [{"kind": "computed-torque", "bandwidth": 30}],
-    }
     pd = loop | {"name": "pd", "feed_forward": "none"}
+    torque = pd | {"name": "torque", "controller": [{"kind": "computed-torque", "bandwidth": 30}]}
     return {
         "name": "joints", "space": "spatial", "gravity": [1.0, 2.0, -9.0], "body": [{"name": "b", "rigid": BODY}],
-        "joint": [joint],
-        "trajectory": [path], "analysis": [inverse, loop, pd, torque],
+        "joint": [joint], "trajectory": [path], "analysis": [inverse, loop, pd, torque],
     }  # fmt: skip
 
 
