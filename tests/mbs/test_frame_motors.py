@@ -8,26 +8,32 @@ import tree_oracle
 import zoo
 from beam_links import beam_link, rectangle
 from body_equations import Accelerated
-from checkpoint_scenes import as_scene, coordinates, motor_on_frames, tree_model
+from checkpoint_mechanisms import CASES, load
+from checkpoint_scenes import as_scene, checkpoint_scene, coordinates, motor_on_frames, tree_model
 from mechanisms import pcid, relative
+from moving_trees import state_of
 from oracle_runs import evaluated, posture_of, run
 from random_mechanisms import random_tree
 
 import ffrobot
 from ffrobot.mbs import _core
 from ffrobot.mbs.linear.linearisation import LinearEquations
+from ffrobot.mbs.model.build import build_model
 from ffrobot.mbs.model.known_motion import required_forces
 from ffrobot.mbs.model.system import MultibodySystem
+from ffrobot.mbs.quantities.supply import actuator_forces
+from ffrobot.run.bodies import load_bodies
 
 MOMENT = 0.7  # N·m
+MOMENT_OF_TIME = _core.TimeFunction.constant(MOMENT)
 
 
-def state_of(turned, drives):
+def driven_state(turned):
     """A chain of three solids and beams at random q and v under a motor in its second joint: model, and state."""
     tree = random_tree(np.random.default_rng(8), ["revolute"] * 3, ("solid", "beam"), chain=True, size=0.02)
     plain, tables = as_scene(tree, turned)
     model = tree_model(plain, tables)
-    system = MultibodySystem(model, drives(model))
+    system = MultibodySystem(model, motor_on_frames(model, 1, MOMENT_OF_TIME))
     rng = np.random.default_rng(1)
     q = model.tree.at_rest(coordinates(model, plain, turned))
     for node in model.tree.nodes:
@@ -41,8 +47,7 @@ def state_of(turned, drives):
 @pytest.mark.parametrize("turned", [False, True])
 def test_generalized_forces_are_the_virtual_work_of_the_frames(turned):
     """M v̇ − Q of what the core finds is τ z·(∂ω_b − ∂ω_a), z of the joint, ω of the two frames."""
-    size = _core.TimeFunction.constant(MOMENT)
-    model, state = state_of(turned, lambda model: motor_on_frames(model, 1, size))
+    model, state = driven_state(turned)
     node = model.tree.nodes[1]
     axis = tree_oracle.motion(model.tree, node.inner, state.q, state.frames).F[0, :, 2]
     expected = MOMENT * axis @ (state.frames[1].L[0, 3:] - state.frames[node.inner.body].L[0, 3:])
@@ -58,8 +63,7 @@ def test_linear_models_are_those_of_motions_beside_it(turned):
 
     Its jerk is found by differences of accelerations along it. Of what drives it, the moment alone is left.
     """
-    size = _core.TimeFunction.constant(MOMENT)
-    model, state = state_of(turned, lambda model: motor_on_frames(model, 1, size))
+    model, state = driven_state(turned)
     on_frames = replace(model, scene=model.scene.model_copy(update={"motors": "frame"}))
     q, v, a = state.q[0], state.v[0], state.a[0]
     linearisation = LinearEquations(on_frames, q)
@@ -69,7 +73,7 @@ def test_linear_models_are_those_of_motions_beside_it(turned):
     expected[found.names.index(f"joint/{joint}")] = model.sign(joint) * MOMENT
     np.testing.assert_allclose(found.force, expected, atol=1e-8)
 
-    system = MultibodySystem(model, motor_on_frames(model, 1, size))
+    system = MultibodySystem(model, motor_on_frames(model, 1, MOMENT_OF_TIME))
 
     def acceleration(dt):
         beside = np.concatenate([tree.integrate(q, dt * v), v + dt * a])
@@ -123,3 +127,42 @@ def test_too_few_named_motors_are_refused():
         ffrobot.InputError, match=r"as many motors as the mechanism has degrees of freedom \(2\), found 1"
     ):
         run(zoo.build("chain of 2", joint=joints), pcid())
+
+
+CLOSE = 2e-9  # of the peak: the digits in which two step sizes of the numbers agree
+
+
+def motion_of(name):
+    """The samples of a checkpoint as a motion, its motors between frames: multipliers of paths are their forces."""
+    scene, data = checkpoint_scene(name).model_copy(update={"motors": "frame"}), load(name)
+    model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None).values()])
+    tree, samples = model.tree, data["samples"]
+    time = np.array([sample["t"] for sample in samples])
+    q, v = np.zeros((len(time), tree.n_q)), np.zeros((len(time), tree.n_v))
+    angles, rates = (np.array([sample[key] for sample in samples]) for key in ("joints", "joint_rates"))
+    first = 0
+    for node in tree.nodes:
+        count = node.joint.freedoms
+        q[:, node.q], v[:, node.v] = angles[:, first : first + count], rates[:, first : first + count]
+        first += count
+        if node.body.n_modes:
+            q[:, node.p_q] = [sample["bodies"][node.body.name]["modal"] for sample in samples]
+            v[:, node.p_v] = [sample["bodies"][node.body.name]["modal_velocity"] for sample in samples]
+    forces = np.array([sample["path_force"] for sample in samples])
+    multipliers = -forces[:, : len(model.rows)]
+    return state_of(model, time, q, v, np.zeros_like(v), multipliers), data
+
+
+def close(found, expected, scale=None):
+    expected = np.array(expected)
+    np.testing.assert_allclose(found, expected, atol=CLOSE * max(np.abs(expected).max(), scale or 1e-12))
+
+
+@pytest.mark.parametrize("name", [name for name in CASES if name != "slider_crank_3d"])
+def test_motors_between_frames(name):
+    """The same moments, other modal forces: no angle, but a virtual work."""
+    motion, data = motion_of(name)
+    close(np.hstack(list(actuator_forces(motion).moments.values())), [sample["moments"] for sample in data["samples"]])
+    for body, values in actuator_forces(motion).modal.items():
+        if values.shape[1]:
+            close(values, [sample["bodies"][body]["modal_force_frame"] for sample in data["samples"]])

@@ -14,32 +14,27 @@ from ffrobot.mbs.posture.start import undeformed_posture
 HOLD = {"name": "tip", "point": "link2.tip", "x": repr(TIP[0]), "y": repr(TIP[1])}
 
 
-def refused(model, match):
-    with pytest.raises(InputError, match=match):
-        run(model, pcid())
-
-
 def started(robot):
     state = undeformed_posture(robot.model)
     return evaluated(robot, 0.0, state.q, state.v)
 
 
-def test_loop_that_cannot_be_closed_is_named():
-    joints = [
-        revolute("O", "ground", "link1.root"),
-        revolute("A", "link1.tip", "link2.root"),
-        revolute("far", "link2.tip", "ground", at=(2.5, 0.0)),
-    ]
-    refused(
-        make_model(arm_links(), joint=joints, trajectory=[{"name": "a", "angle": "link1", "value": "0.3"}]),
-        r'that meets .*"a" at t = 0, found none',
-    )
+FAR = [revolute("O", "ground", "link1.root"), revolute("A", "link1.tip", "link2.root"),
+       revolute("far", "link2.tip", "ground", at=(2.5, 0.0))]  # fmt: skip
 
 
-@pytest.mark.parametrize("component", [{"x": repr(TIP[0])}, {"y": "0.1"}])
-def test_repeated_and_contradicting_trajectories_are_named(component):
-    other = {"name": "other", "point": "link2.tip", **component}
-    refused(arm(trajectory=[HOLD, other]), r'"other"')
+@pytest.mark.parametrize(
+    ("made", "match"),
+    [
+        (lambda: make_model(arm_links(), joint=FAR, trajectory=[{"name": "a", "angle": "link1", "value": "0.3"}]),
+         r'that meets .*"a" at t = 0, found none'),
+        *((lambda at=at: arm(trajectory=[HOLD, {"name": "other", "point": "link2.tip"} | at]), r'"other"')
+          for at in ({"x": repr(TIP[0])}, {"y": "0.1"})),
+    ],
+)  # fmt: skip
+def test_loops_and_paths_that_cannot_be_met_are_named(made, match):
+    with pytest.raises(InputError, match=match):
+        run(made(), pcid())
 
 
 def test_robot_without_equilibrium_is_refused():

@@ -1,15 +1,131 @@
-"""Coordinates, inputs and outputs of the linear equations about a planar motion."""
+"""Linear equations against differences of the nonlinear ones: all joints, loops, in motion; what goes in and out."""
+
+import ctypes
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import zoo
 from links import arm, arm_links, ritz_link
 from mechanisms import make_model, pcid, revolute
+from moving_trees import moving
 from oracle_runs import run
+from random_mechanisms import TYPES
+from tree_oracle import row_values
 
 from ffrobot.common.errors import SolveError
+from ffrobot.mbs import _core
+from ffrobot.mbs._core import StateFunction
+from ffrobot.mbs.fields.expressions import parse_expression
 from ffrobot.mbs.linear.linearisation import LinearEquations
+from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.posture.start import undeformed_posture
+from ffrobot.mbs.scene.loads import Load
+
+KINDS = ("rigid", "solid", "beam", "supported beam", "stiffened solid", "stiffened beam")
+
+
+def kinds_of(joint, loops=0):
+    """Points of loops have no geometric stiffness."""
+    return ("rigid", "beam") if joint == "free" else KINDS[:4] if loops else KINDS
+
+
+def differences(function, n, h=1e-4):
+    """∂function/∂x (…, n) at x = 0 by differences of fourth order."""
+    columns = []
+    for k in range(n):
+        dx = np.zeros(n)
+        dx[k] = h
+        values = [function(s * dx) for s in (-2, -1, 1, 2)]
+        columns.append((values[0] - 8 * values[1] + 8 * values[2] - values[3]) / (12 * h))
+    return np.stack(columns, axis=-1)
+
+
+@pytest.mark.parametrize("loops", [0, 1])
+@pytest.mark.parametrize("joint", TYPES)
+def test_derivatives_are_those_of_evaluations(joint, loops):
+    if loops and joint not in ("revolute", "spherical", "universal"):
+        pytest.skip("random loops of these are rigid")
+    rng = np.random.default_rng(TYPES.index(joint))
+    motion, system = moving(rng, [joint] * 3, kinds_of(joint, loops), loops=loops)
+    tree, q, v = motion.model.tree, motion.q[0], motion.v[0]
+    target = rng.standard_normal(len(motion.model.rows))
+    force = rng.standard_normal(tree.n_v)
+    scene = _core.TreeScene()
+    for of_row in target:
+        scene.add_target(parse_expression(f"{of_row / 2!r}*t**2"))
+    found = system.core.derivatives(scene, 0.0, q, v, force)
+
+    def a(dq=0.0, dv=0.0, df=0.0):
+        return system.core.evaluate(tree.integrate(q, np.zeros(tree.n_v) + dq), v + dv, target, force + df, None)[0]
+
+    # By forces a is linear: with a step of 1 differences are exact but for rounding, which a small step magnifies.
+    for derivative, by, h in ((found.a_q, "dq", 1e-5), (found.a_v, "dv", 1e-5), (found.a_f, "df", 1.0)):
+        expected = differences(lambda x, by=by: a(**{by: x}), tree.n_v, h)
+        np.testing.assert_allclose(derivative, expected, rtol=0, atol=2e-8 * max(1, np.abs(expected).max()))
+    if loops:
+        np.testing.assert_allclose(found.value_q, row_values(motion.model, q[None], np.zeros(1))[1][0], atol=1e-12)
+        expected = differences(lambda x: system.core.measure(tree.integrate(q, x), v)[1], tree.n_v)
+        np.testing.assert_allclose(found.rate_q, expected, atol=1e-8 * np.abs(expected).max())
+
+
+def pull(t, position, rate, force):
+    """On a section: a cubic spring, a damper that turns with it, moments of its orientation, and of its spin."""
+    r, R, v, omega = np.array(position[:3]), np.array(position[3:12]).reshape(3, 3), rate[:3], rate[3:6]
+    force[:3] = -3.0 * (r - 0.2) * (1 + r @ r) - R @ np.diag([1.0, 2.0, 0.5]) @ R.T @ v
+    force[3:6] = 2.0 * R[:, 0] + t * R[:, 1] - np.square(omega) * np.sign(omega)
+
+
+@pytest.mark.parametrize("joint", ["revolute", "spherical", "free"])
+def test_derivatives_with_a_force_of_the_motion(joint):
+    """Its own derivatives are central differences, which leave about 1e-9."""
+    numbers = ctypes.POINTER(ctypes.c_double)
+
+    @ctypes.CFUNCTYPE(None, ctypes.c_double, numbers, numbers, numbers)
+    def compiled(t, position, rate, force):
+        position, rate, force = (np.ctypeslib.as_array(x, (n,)) for x, n in ((position, 12), (rate, 6), (force, 6)))
+        pull(t, position, rate, force)
+
+    motion, _ = moving(np.random.default_rng(TYPES.index(joint)), [joint] * 3, kinds_of(joint))
+    model, q, v, t = motion.model, motion.q[0], motion.v[0], 0.7
+    body = model.tree.nodes[-1].body
+    function = StateFunction.compiled(ctypes.cast(compiled, ctypes.c_void_p).value, is_planar=False)
+    load = Load(point=f"{body.name}.{list(body.points)[-1]}", force=function)
+    system = MultibodySystem(replace(model, scene=model.scene.model_copy(update={"load": (load,)})))
+    found, n = system.core.derivatives(system.scene, t, q, v, np.zeros(model.tree.n_v)), model.tree.n_v
+
+    def a(dq=0.0, dv=0.0):
+        states = np.concatenate([model.tree.integrate(q, np.zeros(n) + dq), v + dv])[None]
+        return _core.tree_outputs(system.core, system.scene, [t], states, None).accelerations[0]
+
+    without = MultibodySystem(model)
+    without = without.core.derivatives(without.scene, t, q, v, np.zeros(n))
+    for key, by in (("a_q", "dq"), ("a_v", "dv")):
+        expected = differences(lambda x, by=by: a(**{by: x}), n, 1e-4)
+        difference = getattr(found, key) - expected
+        np.testing.assert_allclose(difference, 0, atol=2e-7 * max(1, np.abs(expected).max()))
+        assert np.abs(getattr(without, key) - expected).max() > 1e3 * np.abs(difference).max()
+
+
+@pytest.mark.parametrize("loops", [0, 1])
+@pytest.mark.parametrize("joint", TYPES)
+def test_the_motion_itself_is_one_of_the_motions_beside_it(joint, loops):
+    """Begun a little later, a free motion is δ = v, δs̈ the rate of its accelerations."""
+    if loops and joint not in ("revolute", "spherical", "universal"):
+        pytest.skip("random loops of these are rigid")
+    motion, system = moving(
+        np.random.default_rng(20 + TYPES.index(joint)), [joint] * 3, kinds_of(joint, loops), loops=loops
+    )
+    q, v, a = motion.q[0], motion.v[0], motion.a[0]
+    linearisation = LinearEquations(motion.model, q)
+    found = linearisation.at(0.0, q, v, a)
+    s = linearisation.independent
+    core = system.core.derivatives(system.scene, 0.0, q, v, np.zeros(motion.model.tree.n_v))
+    signs = found.transformation[s].diagonal()
+    jerk = signs * (core.a_q @ v + core.a_v @ a)[s]
+    terms = [found.M @ jerk, found.D @ (signs * a[s]), found.K @ (signs * v[s])]
+    np.testing.assert_allclose(sum(terms), 0, atol=1e-9 * max(np.abs(term).max() for term in terms))
+    np.testing.assert_allclose(found.force, 0, atol=1e-9 * max(1.0, np.abs(found.M @ a[s]).max()))
 
 
 @pytest.mark.parametrize("stiffened", [False, True])
