@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
 import click
 
@@ -34,7 +34,17 @@ from .options import POSITIVE, output_option, protect, reading
     help="Keep the mass that a link has beyond its flexible link file, as a payload on the flexible link.",
 )
 @logging_options
-def import_(file: Path, output: Path, flexible: tuple[str, ...], *, force: bool, **how: Any) -> None:
+def import_(
+    file: Path,
+    output: Path,
+    flexible: tuple[str, ...],
+    density: float | None,
+    radius: float | None,
+    *,
+    force: bool,
+    fix_inertia: bool,
+    keep_rest: bool,
+) -> None:
     """Import a robot description (URDF) as a 3D scene, or flexible bodies or motions of other programs.
 
     DIR/scene.toml has bodies and joints. Links are rigid with their <inertial> unless --flexible names a link file.
@@ -48,12 +58,13 @@ def import_(file: Path, output: Path, flexible: tuple[str, ...], *, force: bool,
     """
     from ..exchange.export import MOTIONS, READERS, import_body, import_motion, print_export, print_import
     from ..exchange.urdf.import_urdf import import_urdf
+    from ..exchange.urdf.shape_masses import Filling
     from ..present.console import summary_console
 
     links, suffix = _links(flexible), file.suffix.lower()
     is_motion = suffix in MOTIONS or file.is_dir()
     if is_motion or suffix in READERS:
-        if links or any(how.values()) or (force and not is_motion):
+        if links or fix_inertia or density or radius or keep_rest or (force and not is_motion):
             allowed, what = ("--output and --force", "a motion") if is_motion else ("--output", "a body")
             raise InputError(f"{file}: expected a URDF for options other than {allowed}", what)
         protect(file)
@@ -62,12 +73,16 @@ def import_(file: Path, output: Path, flexible: tuple[str, ...], *, force: bool,
         return
     if instead := ELSEWHERE.get(suffix):
         raise InputError(f"{file}: expected a URDF, a body or a motion", f"none of these: {instead}")
-    if how["radius"] and how["density"] is None:
+    if radius and density is None:
         raise InputError("--radius: expected --density with it", "none")
-    if how["keep_rest"] and not links:
+    if keep_rest and not links:
         raise InputError("--keep-rest: expected --flexible with it", "none")
     protect(file, *links.values())
-    print_import(import_urdf(file, output, links, force=force, **how), summary_console())
+    filling = None if density is None else Filling(density, radius)
+    imported = import_urdf(
+        file, output, links, force=force, fix_inertia=fix_inertia, filling=filling, keep_rest=keep_rest
+    )
+    print_import(imported, summary_console())
 
 
 def _links(pairs: tuple[str, ...]) -> Mapping[str, Path]:
@@ -122,7 +137,15 @@ ELSEWHERE = {
 @output_option("FILE", "Output file [next to the input, by analysis].")
 @click.option("--force", is_flag=True, help="Replacement of an existing file.")
 @logging_options
-def export(file: Path, file_format: str, **how: Any) -> None:
+def export(
+    file: Path,
+    file_format: str,
+    analysis: str | None,
+    side: Literal["motor", "joint"] | None,
+    output: Path | None,
+    *,
+    force: bool,
+) -> None:
     """Export results, a modal body or a scene in a format of other programs.
 
     \b
@@ -143,4 +166,4 @@ def export(file: Path, file_format: str, **how: Any) -> None:
     from ..present.console import summary_console
 
     with reading(file):
-        print_export(export_file(file, file_format, **how), summary_console())
+        print_export(export_file(file, file_format, analysis, output, force=force, side=side), summary_console())

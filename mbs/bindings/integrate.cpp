@@ -12,9 +12,7 @@
 
 namespace {
 
-VectorXd as_vector(const std::vector<double> &values) {
-  return Eigen::Map<const VectorXd>(values.data(), values.size());
-}
+VectorXd as_vector(const std::vector<double> &values) { return Map<const VectorXd>(values.data(), values.size()); }
 
 void make_controls(IntegrationControls *c, double tolerance, unsigned long max_steps,
                    const std::vector<std::tuple<MethodKind, double, double>> &methods, double spectral_radius) {
@@ -29,17 +27,10 @@ void make_controls(IntegrationControls *c, double tolerance, unsigned long max_s
 }
 
 void bind_kinds(nb::module_ &m) {
-  nb::enum_<IntegrationStatus>(m, "IntegrationStatus", "How an integration ended.")
-      .value("completed", IntegrationStatus::completed)
-      .value("step_underflow", IntegrationStatus::step_underflow)
-      .value("too_many_steps", IntegrationStatus::too_many_steps)
-      .value("interrupted", IntegrationStatus::interrupted)
-      .value("diverged", IntegrationStatus::diverged);
-  nb::enum_<MethodKind>(m, "MethodKind", "The integrators.")
-      .value("dopri5", MethodKind::dopri5)
-      .value("dop853", MethodKind::dop853)
-      .value("radau", MethodKind::radau)
-      .value("generalized_alpha", MethodKind::generalized_alpha);
+  bind_values(nb::enum_<IntegrationStatus>(m, "IntegrationStatus", "How an integration ended."),
+              FFROBOT_VALUES(IntegrationStatus, completed, step_underflow, too_many_steps, interrupted, diverged));
+  bind_values(nb::enum_<MethodKind>(m, "MethodKind", "The integrators."),
+              FFROBOT_VALUES(MethodKind, dopri5, dop853, radau, generalized_alpha));
 }
 
 } // namespace

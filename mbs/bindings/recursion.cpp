@@ -34,15 +34,15 @@ std::tuple<VectorXd, VectorXd> evaluate(Model<Space> &model, const VectorXd &q, 
     forces.wrench = wrench->data();
   }
   VectorXd a(model.mechanism.n_v);
-  accelerations(model.mechanism, q.data(), v.data(), forces, target.data(), model.w, a.data());
-  return {a, Eigen::Map<const VectorXd>(model.w.lambda.data(), model.rows())};
+  accelerations(q.data(), v.data(), forces, target.data(), model.w, a.data());
+  return {a, Map<const VectorXd>(model.w.lambda.data(), model.rows())};
 }
 
 template <class Space>
 std::tuple<VectorXd, VectorXd> constraint_values_of(Model<Space> &model, const VectorXd &q, const VectorXd &v) {
   model.check_state(q, v);
   VectorXd value(model.rows()), rate(model.rows());
-  measure(model.mechanism, q.data(), v.data(), model.w, value.data(), rate.data());
+  measure(q.data(), v.data(), model.w, value.data(), rate.data());
   return {value, rate};
 }
 
@@ -53,18 +53,18 @@ Derivatives derivatives_at(Model<Space> &model, const Scene &scene, double t, co
   check_scene(model, scene);
   check_size("supplied", supplied.size(), model.mechanism.n_v);
   turn_markers(scene, t, model.w);
-  keep_independent_constraints(model.mechanism, q.data(), v.data(), model.w);
+  keep_independent_constraints(q.data(), v.data(), model.w);
   SceneForces<Space> acting(model.mechanism, scene, nullptr, nullptr);
   acting.at(t, q.data(), v.data(), model.w);
   VectorXd force = supplied;
   if (const double *given = acting.generalized())
-    force += Eigen::Map<const VectorXd>(given, force.size());
+    force += Map<const VectorXd>(given, force.size());
   VectorXd target(model.rows()), state(q.size() + v.size());
   state << q, v;
   const std::vector<Jet> targets = targets_at(scene, t);
   for (Index r = 0; r < target.size(); ++r)
     target[r] = targets[r].acceleration;
-  Derivatives found = derivatives_under(model.mechanism, scene, t, state, force, target, model.w, true);
+  Derivatives found = derivatives_under(scene, t, state, force, target, model.w, true);
   for (const JointForce &joint : scene.joint_forces)
     found.a_v.col(joint.v) -= joint.friction.slope(v[joint.v]) * found.a_f.col(joint.v);
   return found;
@@ -76,7 +76,7 @@ double time_of(Model<Space> &model, const VectorXd &q, const VectorXd &v, const 
   VectorXd a(model.mechanism.n_v);
   const auto start = std::chrono::steady_clock::now();
   for (int i = 0; i < repetitions; ++i)
-    accelerations(model.mechanism, q.data(), v.data(), Forces<double>(), target.data(), model.w, a.data());
+    accelerations(q.data(), v.data(), Forces<double>(), target.data(), model.w, a.data());
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / repetitions;
 }
 
@@ -102,26 +102,14 @@ std::vector<Mobility> mobilities_of(Model<Space> &model, const Scene &scene, con
   std::vector<Mobility> mobilities;
   for (std::size_t i = 0; i < times.size(); ++i) {
     turn_markers(scene, times[i], model.w);
-    mobilities.push_back(mobility(model.mechanism, watch, q.row(i).data(), model.w, loop_rank));
+    mobilities.push_back(mobility(watch, q.row(i).data(), model.w, loop_rank));
   }
   return mobilities;
 }
 
 template <class Space> void bind_body(nb::module_ &m, const char *name) {
-  using Body = BodyModel<typename Space::Data>;
-  nb::class_<Body>(m, name, "A body of a tree and its inboard joint; see mbs/core/recursion/model.h.")
-      .def(nb::init<>())
-      .def_rw("name", &Body::name)
-      .def_rw("parent", &Body::parent)
-      .def_rw("parent_marker", &Body::parent_marker)
-      .def_rw("inboard_marker", &Body::inboard_marker)
-      .def_rw("joint", &Body::joint)
-      .def_rw("lead", &Body::lead)
-      .def_rw("rotor_inertia", &Body::rotor_inertia)
-      .def_rw("gear_ratio", &Body::gear_ratio)
-      .def_rw("driven", &Body::driven)
-      .def_rw("of_section", &Body::of_section)
-      .def_rw("data", &Body::data);
+  bind_fields(nb::class_<BodyModel<typename Space::Data>>(
+      m, name, "A body of a tree and its inboard joint; see mbs/core/recursion/model.h."));
 }
 
 template <class Space> void bind_model(nb::class_<Model<Space>> model) {
@@ -147,7 +135,7 @@ template <class Space> void bind_model(nb::class_<Model<Space>> model) {
           "keep_independent_rows",
           [](Model<Space> &model, const VectorXd &q, const VectorXd &v) {
             model.check_state(q, v);
-            return keep_independent_constraints(model.mechanism, q.data(), v.data(), model.w);
+            return keep_independent_constraints(q.data(), v.data(), model.w);
           },
           "q"_a, "v"_a, "Indices of rows that do not depend on others at a state; the rest is left out from now on.")
       .def("measure", &constraint_values_of<Space>, "q"_a, "v"_a, "Values and rates of rows.")
@@ -163,7 +151,7 @@ template <class Space> void bind_rest(nb::class_<Model<Space>> model) {
           [](Model<Space> &model, const Scene &scene, double t, const VectorXd &q) {
             model.check_state(q, VectorXd::Zero(model.mechanism.n_v));
             check_scene(model, scene);
-            return forces_at_rest(model.mechanism, scene, t, q, model.w);
+            return forces_at_rest(scene, t, q, model.w);
           },
           "scene"_a, "t"_a, "q"_a, "Forces and constraint equations at rest.")
       .def(
@@ -175,7 +163,7 @@ template <class Space> void bind_rest(nb::class_<Model<Space>> model) {
             check_size("multipliers", multipliers.size(), model.rows());
             for (const int r : independent)
               check_index("row", r, model.rows());
-            return stiffness_at_rest(model.mechanism, scene, t, q, multipliers, independent, model.w);
+            return stiffness_at_rest(scene, t, q, multipliers, independent, model.w);
           },
           "scene"_a, "t"_a, "q"_a, "multipliers"_a, "independent"_a,
           "(n_v, n_v) derivative of C_q^T multipliers - Q by increments of q, exact; multipliers of rows that are not\n"
@@ -188,14 +176,14 @@ template <class Space> void bind_kinematics(nb::class_<Model<Space>> model) {
           "frames",
           [](Model<Space> &model, const VectorXd &q, const VectorXd &v) {
             model.check_state(q, v);
-            return frame_motions(model.mechanism, q.data(), v.data(), model.w);
+            return frame_motions(q.data(), v.data(), model.w);
           },
           "q"_a, "v"_a, "Motion of all frames, accelerations those of the last evaluation.")
       .def(
           "motions",
           [](Model<Space> &model, const RowMajor &q, const RowMajor &v) {
             check_states(model, q, v);
-            return motions_of_states(model.mechanism, q, v, model.w);
+            return motions_of_states(q, v, model.w);
           },
           "q"_a, "v"_a,
           "(T, 18 (bodies + wrenches)) of states q (T, n_q), v (T, n_v): position (m), axes (3, 3) row by row, "
@@ -219,7 +207,7 @@ template <class Space> void bind_postures(nb::class_<Model<Space>> model) {
           "constraints",
           [](Model<Space> &model, const Scene &scene, const std::vector<double> &times, const RowMajor &q) {
             check_postures(model, scene, times, q);
-            return Postures<Space>(model.mechanism, scene, model.w).constraints(times, q);
+            return Postures<Space>(scene, model.w).constraints(times, q);
           },
           "scene"_a, "times"_a, "q"_a,
           "Values of rows less targets (T, rows), less full turns, and C_v (T, rows n_v) at times (T) and q (T, n_q).")
@@ -228,7 +216,7 @@ template <class Space> void bind_postures(nb::class_<Model<Space>> model) {
           [](Model<Space> &model, const Scene &scene, const std::vector<double> &times, const RowMajor &q,
              const RowMajor &v) {
             check_postures(model, scene, times, q), check_states(model, q, v);
-            return Postures<Space>(model.mechanism, scene, model.w).rates(times, q, v);
+            return Postures<Space>(scene, model.w).rates(times, q, v);
           },
           "scene"_a, "times"_a, "q"_a, "v"_a, "Rates of rows less those of targets (T, rows).")
       .def(
@@ -239,8 +227,7 @@ template <class Space> void bind_postures(nb::class_<Model<Space>> model) {
             check_size("scales", scales.size(), model.mechanism.n_v), check_size("sizes", sizes.size(), model.rows());
             if (beside.size())
               check_size("beside", beside.rows(), q.rows()), check_size("beside", beside.cols(), model.rows());
-            return Postures<Space>(model.mechanism, scene, model.w)
-                .solve(times, q, beside, {scales, sizes, largest_step});
+            return Postures<Space>(scene, model.w).solve(times, q, beside, {scales, sizes, largest_step});
           },
           "scene"_a, "times"_a, "q"_a, "beside"_a, "scales"_a, "sizes"_a, "largest_step"_a,
           "q (T, n_q) moved onto the rows at times (T), and what is left (T) in natural sizes: see "
@@ -257,7 +244,7 @@ template <class Space> void bind_forces(nb::class_<Model<Space>> model) {
           [](Model<Space> &model, const RowMajor &q, const RowMajor &forces) {
             check_size("forces", forces.rows(), q.rows()), check_size("q", q.cols(), model.mechanism.n_q);
             check_size("forces", forces.cols(), Space::dim * model.mechanism.nodes.size());
-            return without_work(model.mechanism, q, forces, model.w);
+            return without_work(q, forces, model.w);
           },
           "q"_a, "forces"_a,
           "(T, dim bodies) what of forces with moments on outer sections of joints does no work along coordinates.")

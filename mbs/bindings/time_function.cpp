@@ -60,38 +60,13 @@ std::vector<double> switches(const TimeFunction &function) {
   return found;
 }
 
-void bind_operations(nb::module_ &m) {
-  nb::enum_<Op>(m, "Op", "Instructions of an expression in postfix order.")
-      .value("constant", Op::constant)
-      .value("time", Op::time)
-      .value("add", Op::add)
-      .value("subtract", Op::subtract)
-      .value("multiply", Op::multiply)
-      .value("divide", Op::divide)
-      .value("power", Op::power)
-      .value("negate", Op::negate)
-      .value("sin", Op::sin)
-      .value("cos", Op::cos)
-      .value("tan", Op::tan)
-      .value("exp", Op::exp)
-      .value("log", Op::log)
-      .value("sqrt", Op::sqrt)
-      .value("abs", Op::abs)
-      .value("tanh", Op::tanh)
-      .value("less", Op::less)
-      .value("less_equal", Op::less_equal)
-      .value("greater", Op::greater)
-      .value("greater_equal", Op::greater_equal)
-      .value("logical_and", Op::logical_and)
-      .value("logical_or", Op::logical_or)
-      .value("logical_not", Op::logical_not)
-      .value("select", Op::select);
-}
-
 } // namespace
 
 void bind_time_function(nb::module_ &m) {
-  bind_operations(m);
+  bind_values(nb::enum_<Op>(m, "Op", "Instructions of an expression in postfix order."),
+              FFROBOT_VALUES(Op, constant, time, add, subtract, multiply, divide, power, negate, sin, cos, tan, exp,
+                             log, sqrt, abs, tanh, less, less_equal, greater, greater_equal, logical_and, logical_or,
+                             logical_not, select));
   nb::class_<TimeFunction>(m, "TimeFunction",
                            "A function of time with exact first and second derivatives; NaN where it has none.")
       .def_static(

@@ -1,8 +1,8 @@
-// Plain data to bytes and back, both ways by one description of each record: fields(archive, record) names its members.
+// Plain data to bytes and back, both ways by one description of each record: its fields (fields.h).
 // Bytes are those of this machine's numbers; a file is read by the program that it was written with.
 #pragma once
 
-#include <Eigen/Core>
+#include "core/eigen.h"
 
 #include <algorithm>
 #include <array>
@@ -77,14 +77,17 @@ template <class Archive, class Matrix> void archived_matrix(Archive &archive, Ma
   archive.raw(x.data(), x.size() * sizeof(double));
 }
 
-template <class Archive, class T> void fields(Archive &archive, std::optional<T> &x) {
+template <class Archive, class T> void archived_parts(Archive &archive, std::optional<T> &x) {
   bool is_there = x.has_value();
   T value = x.value_or(T());
   archived(archive, is_there), archived(archive, value);
   x = is_there ? std::optional(value) : std::nullopt;
 }
-template <class Archive, class A, class B> void fields(Archive &archive, std::pair<A, B> &x) {
+template <class Archive, class A, class B> void archived_parts(Archive &archive, std::pair<A, B> &x) {
   archived(archive, x.first), archived(archive, x.second);
+}
+template <class Archive, class T> void archived_parts(Archive &archive, T &x) {
+  x.fields([&](const char *, auto &...member) { (archived(archive, member), ...); });
 }
 
 template <class Archive, class T> void archived(Archive &archive, T &x) {
@@ -95,10 +98,8 @@ template <class Archive, class T> void archived(Archive &archive, T &x) {
   else if constexpr (requires { x.begin(); })
     archived_range(archive, x);
   else
-    fields(archive, x);
+    archived_parts(archive, x);
 }
-
-template <class Archive, class... T> void archived_all(Archive &archive, T &...x) { (archived(archive, x), ...); }
 
 template <class T> std::string to_bytes(T x) { // a copy: one description serves both ways
   Writer writer;

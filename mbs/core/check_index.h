@@ -1,7 +1,7 @@
 // Numbers that callers give for what there are several of.
 #pragma once
 
-#include <Eigen/Core>
+#include "core/eigen.h"
 
 #include <stdexcept>
 #include <string>
@@ -11,7 +11,7 @@ namespace ffrobot {
 
 // Throws std::invalid_argument that says what was expected and got.
 template <class Number, class Count> void check_index(std::string_view name, Number got, Count count) {
-  const auto number = static_cast<Eigen::Index>(got), size = static_cast<Eigen::Index>(count);
+  const auto number = static_cast<Index>(got), size = static_cast<Index>(count);
   if (number < 0 || number >= size)
     throw std::invalid_argument(std::string(name) + ": expected 0 to " + std::to_string(size) + " - 1, got " +
                                 std::to_string(number));

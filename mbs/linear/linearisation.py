@@ -1,6 +1,6 @@
 """The equations of motion, linear about a posture or a motion, in independent coordinates.
 
-The core differentiates them exactly (core/recursion/constrained_aba/derivatives.h). For increments δ of the
+The core differentiates them exactly (core/recursion/inverse/force_slopes.h). For increments δ of the
 coordinates of the tree, rotation vectors in body axes for orientations, δ̇ = δv + B δ; B = −ω~ at orientations, else 0.
 Loops leave δ = H δs and δv = H δv_s + N δs, where v_s are the rates of the independent coordinates s. So
 

@@ -82,7 +82,7 @@ FAULTS = [
     Fault(RECURSION + "inverse/observe.cpp", "to.J(2, 2) += s.p_p;", "to.J(2, 2) += 0;", MBS + "test_projection.py"),
     Fault(RECURSION + "inverse/motors.cpp", "tau = motor.sign * Q_[motor.coordinate],",
           "tau = Q_[motor.coordinate],", MBS + "test_prescribed.py"),
-    Fault(ABA + "joint_elimination.h", "      A[2] += node.lead * A[5];", "      A[2] -= node.lead * A[5];", SPACE),
+    Fault(ABA + "joint_elimination.h", "A[2] -= sign * node.lead * A[5];", "A[2] -= node.lead * A[5];", SPACE),
     Fault(RECURSION + "numbers/multipliers.h", "      x[r] -= factor[k * m + r] * x[k];",
           "      x[r] -= factor[r * m + k] * x[k];", SPACE),
     Fault(RECURSION + "motion/motion_norm.cpp", "frequency > 0 ? 1 / frequency : 0",

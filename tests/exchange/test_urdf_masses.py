@@ -11,6 +11,7 @@ from test_urdf_flexible import ALONG, ARM, BAR, J_BAR, LENGTH, MASS
 from test_urdf_inertias import imported, joint, link
 
 from ffrobot import InputError
+from ffrobot.exchange.urdf.shape_masses import Filling
 
 RHO = 1500.0
 AT = 'xyz="0.1 -0.2 0.3" rpy="0.4 0.5 -0.6"'
@@ -42,10 +43,10 @@ MESHES = {
 def test_shapes_against_their_meshes(shape, tmp_path):
     """The same shape as a fine mesh, whose volume integrals trimesh finds from its triangles."""
     parts = link("base"), joint("j", "base", "arm")
-    of_shape = body_of(imported(tmp_path, *parts, shaped("arm", shape), density=RHO))
+    of_shape = body_of(imported(tmp_path, *parts, shaped("arm", shape), filling=Filling(RHO)))
     MESHES[shape].export(tmp_path / "shape.stl")
     mesh = shaped("arm", '<mesh filename="shape.stl"/>')
-    of_mesh = body_of(imported(tmp_path, *parts, mesh, density=RHO, force=True))
+    of_mesh = body_of(imported(tmp_path, *parts, mesh, filling=Filling(RHO), force=True))
     for one, other in zip(of_shape, of_mesh, strict=True):
         np.testing.assert_allclose(one, other, rtol=0, atol=5e-4 * np.abs(one).max())
 
@@ -61,7 +62,7 @@ def test_meshes_without_an_inside_count_with_their_hull(damage, tmp_path):
     box.export(tmp_path / "shape.stl")
     found = imported(
         tmp_path, link("base"), shaped("arm", '<mesh filename="shape.stl"/>', kind="visual"), joint("j", "base", "arm"),
-        density=RHO,
+        filling=Filling(RHO),
     )  # fmt: skip
     assert body_of(found)[0] == pytest.approx(RHO * 0.006, rel=1e-6)
     assert any("convex hulls of meshes that are open or" in remark for remark in found.remarks)
@@ -72,7 +73,7 @@ def test_meshes_that_cannot_be_read_are_named(content, tmp_path):
     (tmp_path / "shape.stl").write_text(content)
     parts = link("base"), shaped("arm", '<mesh filename="shape.stl"/>'), joint("j", "base", "arm")
     with pytest.raises(InputError, match=r'"arm": <collision>: expected a mesh .*, found shape.stl'):
-        imported(tmp_path, *parts, density=RHO)
+        imported(tmp_path, *parts, filling=Filling(RHO))
 
 
 def test_cylinders_where_meshes_are_missing(tmp_path):
@@ -82,8 +83,8 @@ def test_cylinders_where_meshes_are_missing(tmp_path):
         joint("j", "base", "arm"), joint("k", "arm", "hand", origin='xyz="0.3 0 0.4"'),
     )  # fmt: skip
     with pytest.raises(InputError, match=r"expected its mesh next to the URDF, found no file .*--radius"):
-        imported(tmp_path, *parts, density=RHO)
-    scene = imported(tmp_path, *parts, density=RHO, radius=0.05).scene
+        imported(tmp_path, *parts, filling=Filling(RHO))
+    scene = imported(tmp_path, *parts, filling=Filling(RHO, 0.05)).scene
     rigid = scene["body"][0]["rigid"]
     mass = RHO * np.pi * 0.05**2 * 0.5
     assert rigid["mass"] == pytest.approx(mass, rel=1e-14)

@@ -17,7 +17,7 @@ from ...mbs.model.body import from_modal_body
 from .flexible import ImportedLink, flexible_link
 from .robot import MASSLESS, Inertial, MeshFile, Names, Robot, inertial_of, read_urdf
 from .scene import SceneOfRobot, is_possible
-from .shape_masses import mesh_masses, mesh_path, with_masses, without_mass
+from .shape_masses import Filling, mesh_masses, mesh_path, with_masses, without_mass
 
 SAME = 1e-9  # relative: less is round-off
 
@@ -141,8 +141,7 @@ def import_urdf(
     *,
     force: bool = False,
     fix_inertia: bool = False,
-    density: float | None = None,
-    radius: float | None = None,
+    filling: Filling | None = None,
     keep_rest: bool = False,
 ) -> Imported:
     """Write DIR/scene.toml, and a link file for each link of `flexible`.
@@ -153,8 +152,7 @@ def import_urdf(
         flexible: link files by link.
         force: replace files that are there.
         fix_inertia: see `SceneOfRobot`.
-        density: kg/m³, of what fills the shapes of links without mass; None leaves them massless.
-        radius: m, of cylinders along links without shapes.
+        filling: fills the shapes of links without mass; None leaves them massless.
         keep_rest: what a link of the URDF weighs beyond its flexible link becomes a payload on that one.
 
     Raises:
@@ -163,8 +161,8 @@ def import_urdf(
     """
     with of_file(urdf):
         robot, remarks = read_urdf(urdf), list[str]()
-        if density is not None:
-            robot, remarks = with_masses(robot, urdf, density, radius)
+        if filling is not None:
+            robot, remarks = with_masses(robot, urdf, filling)
         remarks += without_mass(robot)
         stems = Names(["scene"])
         links = {name: flexible_link(robot, name, source, folder, stems[name]) for name, source in flexible.items()}

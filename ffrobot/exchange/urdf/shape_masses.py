@@ -16,6 +16,7 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.rotations import rpy_of, smallest_turn
+from ...common.structs import struct
 from ...common.tables import shown
 from ...fe_models.modal_body import ModalBody
 from ...mesh.skins import loaded_skin
@@ -129,10 +130,17 @@ def bars(points: Sequence[Array], radius: float) -> Iterator[Primitive]:
         yield Primitive("sphere", (2 * radius,), Origin())
 
 
-def with_masses(robot: Robot, urdf: Path, density: float, radius: float | None) -> tuple[Robot, list[str]]:
+@struct
+class Filling:
+    """Material that fills the shapes of links without mass; SI units."""
+
+    density: float  # kg/m³
+    radius: float | None = None  # m, of a cylinder along a link that has no shape of its own; None for no cylinder
+
+
+def with_masses(robot: Robot, urdf: Path, filling: Filling) -> tuple[Robot, list[str]]:
     """The robot with masses for the links that have none but have shapes, and a remark on each of these links.
 
-    Shapes are filled with material of a density (kg/m³); links without shapes are cylinders of a radius (m), if any.
     Shapes for collisions come before those to be seen: they are closed and simple as a rule. The root stands still and
     needs no mass.
     """
@@ -140,7 +148,7 @@ def with_masses(robot: Robot, urdf: Path, density: float, radius: float | None) 
     for name, link in robot.links.items():
         if name == robot.root or (link.inertial is not None and link.inertial.mass > 0):
             continue
-        inertial, what = _filled(robot, link, urdf, density, radius)
+        inertial, what = _filled(robot, link, urdf, filling)
         if inertial is not None:
             links[name] = replace(link, inertial=inertial)
             remarks.append(f'link "{shown(name)}" has no mass: {inertial.mass:.6g} kg by {what}')
@@ -156,32 +164,32 @@ def without_mass(robot: Robot) -> list[str]:
     ]
 
 
-def _filled(
-    robot: Robot, link: UrdfLink, urdf: Path, density: float, radius: float | None
-) -> tuple[Inertial | None, str]:
+def _filled(robot: Robot, link: UrdfLink, urdf: Path, filling: Filling) -> tuple[Inertial | None, str]:
     """Mass and inertia of a link, and what they are made of; None where nothing says how large the link is."""
-    with_density = f"with {density:g} kg/m³"
+    with_density = f"with {filling.density:g} kg/m³"
     for kind, shapes in (("collision", link.collision), ("visual", link.visual)):
         meshes = [shape for shape in shapes if isinstance(shape, MeshFile)]
-        if not shapes or (radius is not None and any(mesh_path(each.filename, urdf) is None for each in meshes)):
+        if not shapes or (
+            filling.radius is not None and any(mesh_path(each.filename, urdf) is None for each in meshes)
+        ):
             continue
         label, parts, hulls = f'link "{shown(link.name)}": <{kind}>', list[Inertial](), ""
         for shape in shapes:
             if isinstance(shape, Primitive):
-                name, part = f"a {shape.shape}", _of_primitive(shape, density)
+                name, part = f"a {shape.shape}", _of_primitive(shape, filling.density)
             else:
-                name, (part, is_hull) = shown(shape.filename), _of_mesh(shape, urdf, density, label)
+                name, (part, is_hull) = shown(shape.filename), _of_mesh(shape, urdf, filling.density, label)
                 hulls = ", convex hulls of meshes that are open or have facets inside out" if is_hull else hulls
             if not (np.isfinite(part.mass) and part.mass > 0):
                 raise InputError(f"{label}: expected a shape with a volume", f"{name} without one")
             parts.append(part)
         return reduce(add, parts), f"its <{kind}> filled {with_density}{hulls}"
     beyond = max(robot.joints_of(link.name), key=lambda joint: joint.way, default=None)
-    if radius is None or beyond is None or not beyond.way:
+    if filling.radius is None or beyond is None or not beyond.way:
         return None, ""
-    (rod,) = bars([np.array(beyond.origin.xyz)], radius)
-    what = f"a cylinder of radius {radius:g} m to {beyond.label} {with_density}"
-    return _of_primitive(rod, density), what
+    (rod,) = bars([np.array(beyond.origin.xyz)], filling.radius)
+    what = f"a cylinder of radius {filling.radius:g} m to {beyond.label} {with_density}"
+    return _of_primitive(rod, filling.density), what
 
 
 def _of_primitive(shape: Primitive, density: float) -> Inertial:

@@ -10,7 +10,7 @@ void bind_forward_motion(nb::module_ &m) {
   nb::class_<LinearOutput>(m, "LinearOutput", "An output that is linear in the state (q, v).")
       .def(nb::init<std::vector<int>, std::vector<double>>(), "entries"_a, "weights"_a);
   nb::class_<PlaceOutput>(m, "PlaceOutput", "Three outputs: where a section of a body is, m, global axes.")
-      .def(nb::init<int, Eigen::Vector3d, MatrixXd, std::vector<MatrixXd>>(), "body"_a, "position"_a, "Phi"_a, "K"_a);
+      .def(nb::init<int, Vector3d, MatrixXd, std::vector<MatrixXd>>(), "body"_a, "position"_a, "Phi"_a, "K"_a);
   nb::class_<ForwardModel>(m, "ForwardModel",
                            "All that a motion under held inputs needs; see mbs/core/forward/forward_motion.h.")
       .def(

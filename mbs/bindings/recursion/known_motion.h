@@ -56,7 +56,7 @@ RowMajor required_forces(Model<Space> &model, const Scene &scene, const std::vec
     forces.load(nullptr, acting.wrench, w);
     forces.require(q.row(i).data(), a.row(i).data(), w, found.row(i).data());
     if (acting.generalized)
-      found.row(i) -= Eigen::Map<const Eigen::RowVectorXd>(acting.generalized, found.cols());
+      found.row(i) -= Map<const RowVectorXd>(acting.generalized, found.cols());
   });
   return found;
 }

@@ -47,10 +47,9 @@ TreeRun outputs_of(const Model<Space> &model, const Scene &scene, const std::vec
 
 // x (n_v) of N x + C_q^T nu = r, C_q x = c at (q, v); complex factors know no c
 template <class Space, class Scalar>
-Eigen::Matrix<Scalar, Eigen::Dynamic, 1>
-newton_step(const Model<Space> &model, const Scene &scene, double t, const VectorXd &q, const VectorXd &v,
-            Scalar damping_factor, Scalar stiffness_factor, const Eigen::Matrix<Scalar, Eigen::Dynamic, 1> &r,
-            const VectorXd &c) {
+Matrix<Scalar, Dynamic, 1> newton_step(const Model<Space> &model, const Scene &scene, double t, const VectorXd &q,
+                                       const VectorXd &v, Scalar damping_factor, Scalar stiffness_factor,
+                                       const Matrix<Scalar, Dynamic, 1> &r, const VectorXd &c) {
   model.check_state(q, v);
   check_scene(model, scene);
   RecursiveMotion<Space> motion(model.mechanism, scene, t, q.data(), v.data());
@@ -62,7 +61,7 @@ newton_step(const Model<Space> &model, const Scene &scene, double t, const Vecto
   motion.local().from_state(state.data(), z.data());
   motion.linearise(t, z.data());
   motion.factorise(damping_factor, stiffness_factor);
-  Eigen::Matrix<Scalar, Eigen::Dynamic, 1> x(v.size());
+  Matrix<Scalar, Dynamic, 1> x(v.size());
   if constexpr (std::is_same_v<Scalar, double>)
     motion.solve(r.data(), c.data(), x.data());
   else
@@ -104,41 +103,34 @@ void bind_checkpoint(nb::module_ &m) {
 }
 
 void bind_report(nb::class_<TreeRun> run) {
-  run.def_prop_ro("status", [](const TreeRun &r) { return r.report.status; })
-      .def_prop_ro("steps", [](const TreeRun &r) { return r.report.steps; })
-      .def_prop_ro("rejected", [](const TreeRun &r) { return r.report.rejected; })
-      .def_prop_ro("evaluations", [](const TreeRun &r) { return r.report.evaluations; })
-      .def_prop_ro("time_reached", [](const TreeRun &r) { return r.report.time; })
-      .def_prop_ro("last_step", [](const TreeRun &r) { return r.report.last_step; })
-      .def_prop_ro("last_error", [](const TreeRun &r) { return r.report.last_error; })
-      .def_prop_ro(
-          "rounding", [](const TreeRun &r) { return r.report.rounding; },
-          "What rounding may have added to errors, in the unit of the tolerance.")
+  run.def_ro("status", &TreeRun::status)
+      .def_ro("steps", &TreeRun::steps)
+      .def_ro("rejected", &TreeRun::rejected)
+      .def_ro("evaluations", &TreeRun::evaluations)
+      .def_ro("time_reached", &TreeRun::time)
+      .def_ro("last_step", &TreeRun::last_step)
+      .def_ro("last_error", &TreeRun::last_error)
+      .def_ro("rounding", &TreeRun::rounding, "What rounding may have added to errors, in the unit of the tolerance.")
       .def_prop_ro(
           "changes",
           [](const TreeRun &r) {
             std::vector<std::tuple<double, MethodKind, MethodKind, double>> changes;
-            for (const auto &[time, from, to, mean_step] : r.report.changes)
+            for (const auto &[time, from, to, mean_step] : r.changes)
               changes.emplace_back(time, from, to, mean_step);
             return changes;
           },
           "Of integrators: (time, from, to, mean step before) of each.")
-      .def_prop_ro(
-          "step_ends", [](const TreeRun &r) { return r.report.step_ends; },
-          "Times (s) where steps ended, as controls ask for them; none where they cannot be repeated.");
+      .def_ro("step_ends", &TreeRun::step_ends,
+              "Times (s) where steps ended, as controls ask for them; none where they cannot be repeated.");
 }
 
 void bind_run(nb::module_ &m) {
   auto run = nb::class_<TreeRun>(m, "TreeRun", "A motion in joint coordinates at outputs, as far as it got.");
   bind_report(run);
-  run.def_prop_ro(
-         "least_ratio", [](const TreeRun &r) { return r.postures.least_ratio; },
-         "Of the scene's watch: 1 without; see mbs/core/recursion/motion/singular_posture.h.")
-      .def_prop_ro(
-          "singular_at", [](const TreeRun &r) { return r.postures.singular_at; }, "When that was, s.")
-      .def_prop_ro(
-          "singular_posture", [](const TreeRun &r) { return r.postures.singular_posture; },
-          "(n_q) q there; empty without a watch.")
+  run.def_ro("least_ratio", &TreeRun::least_ratio,
+             "Of the scene's watch: 1 without; see mbs/core/recursion/motion/singular_posture.h.")
+      .def_ro("singular_at", &TreeRun::singular_at, "When that was, s.")
+      .def_ro("singular_posture", &TreeRun::singular_posture, "(n_q) q there; empty without a watch.")
       .def_prop_ro(
           "ranges",
           [](const TreeRun &r) {
@@ -156,15 +148,13 @@ void bind_run(nb::module_ &m) {
 }
 
 void bind_orientation_laws(nb::module_ &m) {
-  nb::enum_<OrientationKind>(m, "OrientationKind")
-      .value("rotation_vector", OrientationKind::rotation_vector)
-      .value("rpy", OrientationKind::rpy)
-      .value("direction", OrientationKind::direction);
+  bind_values(nb::enum_<OrientationKind>(m, "OrientationKind"),
+              FFROBOT_VALUES(OrientationKind, rotation_vector, rpy, direction));
   nb::class_<OrientationLaw>(m, "TurningLaw", "A triad A(t); see mbs/core/recursion/mechanism/orientation.h.")
       .def(
           "__init__",
           [](OrientationLaw *law, OrientationKind kind, const std::vector<TimeFunction> &functions,
-             const Eigen::Matrix3d &reference) {
+             const Matrix3d &reference) {
             check_size("functions", functions.size(), 3);
             new (law) OrientationLaw{kind, {functions[0], functions[1], functions[2]}, reference};
           },
@@ -233,8 +223,9 @@ void bind_joint_forces(nb::class_<Scene> scene) {
           "b, the next slope from each knot on.")
       .def(
           "add_cut_joint",
-          [](Scene &s, int a, int b, bool turns, const Eigen::Vector3d &axis, double viscous, double coulomb,
-             double speed) { s.cut_joints.push_back({a, b, turns, axis, {viscous, coulomb, speed}}); },
+          [](Scene &s, int a, int b, bool turns, const Vector3d &axis, double viscous, double coulomb, double speed) {
+            s.cut_joints.push_back({a, b, turns, axis, {viscous, coulomb, speed}});
+          },
           "a"_a, "b"_a, "turns"_a, "axis"_a, "viscous"_a, "coulomb"_a, "speed"_a,
           "Friction in a joint at which a loop is cut, between two wrenches of the model: of the turn of b about an "
           "axis "

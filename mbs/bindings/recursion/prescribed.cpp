@@ -99,7 +99,7 @@ derivatives_of(PrescribedMotion<Space> &motion, const std::vector<double> &times
   RowMajor M = nothing(p.rows(), rows * n), D = M, K = M;
   at_positions(motion, {times, p, p_dot, p_ddot}, near, [&](Index i) {
     const LeftSlopes found = motion.slopes();
-    const auto write = [&](const MatrixXd &of, RowMajor &to) { Eigen::Map<RowMajor>(to.row(i).data(), rows, n) = of; };
+    const auto write = [&](const MatrixXd &of, RowMajor &to) { Map<RowMajor>(to.row(i).data(), rows, n) = of; };
     write(found.M, M), write(found.D, D), write(found.K, K);
   });
   return {M, D, K};
@@ -142,7 +142,7 @@ void at_postures(const DrivenMechanism<Space> &driven, const std::vector<double>
     if (!times.empty())
       turn_markers(driven.scene, times[i], w);
     if (i == 0 || !times.empty() || q.row(i) != q.row(i - 1)) {
-      const auto at = place_all(driven.mechanism, q.row(i).data(), v.data(), nullptr, w);
+      const auto at = place_all(q.row(i).data(), v.data(), nullptr, w);
       // for the mass matrix of the modes of stiffened bodies, and their rows
       accelerations(at, nullptr, target.data(), a.data());
     }

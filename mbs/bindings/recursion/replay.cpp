@@ -30,7 +30,7 @@ Reader<Space> actuators_of(const DrivenMechanism<Space> &driven, const VectorXd 
 }
 
 template <class Space>
-Reader<Space> paths_of(const DrivenMechanism<Space> &driven, const Eigen::Matrix3d &axes,
+Reader<Space> paths_of(const DrivenMechanism<Space> &driven, const Matrix3d &axes,
                        const std::vector<std::tuple<int, int, double>> &parts, Index count) {
   std::vector<typename PathReader<Space>::Part> found;
   for (const auto &[row, column, sign] : parts) {
@@ -42,8 +42,7 @@ Reader<Space> paths_of(const DrivenMechanism<Space> &driven, const Eigen::Matrix
   return std::make_shared<PathReader<Space>>(driven.mechanism, axes, std::move(found), count);
 }
 
-using OfBody =
-    std::tuple<int, Eigen::Matrix3d, Eigen::Vector3d, Eigen::Matrix3Xd, Eigen::Matrix3Xd, MatrixXd, VectorXd>;
+using OfBody = std::tuple<int, Matrix3d, Vector3d, Eigen::Matrix3Xd, Eigen::Matrix3Xd, MatrixXd, VectorXd>;
 
 Reader<Spatial> points_of(const DrivenMechanism<Spatial> &driven, const std::vector<OfBody> &bodies) {
   std::vector<PointComponents> found;

@@ -27,7 +27,7 @@ TreeRun sampled_motion_of(const Model<Space> &model, const Scene &scene, const s
   const Index size = q.size() + v.size();
   VectorXd read(size + v.size()); // (q, v, a)
   const auto command = [&, call = locked(controller)](std::size_t k, double t, const double *y) {
-    read.head(size) = Eigen::Map<const VectorXd>(y, size);
+    read.head(size) = Map<const VectorXd>(y, size);
     reader.evaluate(t, y, y + q.size(), read.data() + size);
     return call(k, t, read);
   };
@@ -68,7 +68,7 @@ void bind_tree_sampled(nb::module_ &m) {
       .def(nb::init<MatrixXd>(), "direction"_a, "Generalized forces (n_v, inputs).")
       .def(
           "add_frame_motor",
-          [](ZeroOrderHold &held, Index input, int q, int v, const MatrixXd &rotation, const Eigen::Vector3d &axis) {
+          [](ZeroOrderHold &held, Index input, int q, int v, const MatrixXd &rotation, const Vector3d &axis) {
             check_size("rotation", rotation.rows(), 3);
             held.add_frame_motor(input, {q, v, rotation, axis});
           },

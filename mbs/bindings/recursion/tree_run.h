@@ -77,25 +77,16 @@ struct TreeCheckpoint {
   IntegrationCheckpoint integration;
   MotionHistory history;
   std::vector<RangeSeen> ranges; // of the scene's limits
+
+  FFROBOT_FIELDS(integration, history, ranges);
 };
-template <class Archive> void fields(Archive &a, PostureHistory &x) {
-  archived_all(a, x.least_ratio, x.singular_at, x.singular_posture, x.watched_at, x.determinant);
-}
-template <class Archive> void fields(Archive &a, MotionHistory &x) {
-  archived_all(a, x.peaks.state, x.peaks.force, x.peaks.inertial, x.accepted, x.postures);
-}
-template <class Archive> void fields(Archive &a, TreeCheckpoint &x) {
-  archived_all(a, x.integration, x.history, x.ranges);
-}
 
 // As far as it got.
-struct TreeRun {
-  IntegrationReport report;
-  VectorXd last;                          // (q, v) of the last accepted step
-  RowMajor states, accelerations, lambda; // (T, n_q + n_v), (T, n_v), (T, rows)
-  RowMajor replayed;                      // (T, numbers of its source) what a replay does
-  PostureHistory postures;                // of the scene's watch
-  std::vector<RangeSeen> ranges;          // of the scene's limits
+struct TreeRun : IntegrationReport, PostureHistory { // of the scene's watch
+  VectorXd last;                                     // (q, v) of the last accepted step
+  RowMajor states, accelerations, lambda;            // (T, n_q + n_v), (T, n_v), (T, rows)
+  RowMajor replayed;                                 // (T, numbers of its source) what a replay does
+  std::vector<RangeSeen> ranges;                     // of the scene's limits
 
   template <class Space> TreeRun(const Model<Space> &model, std::size_t count) {
     const Index T = count;
@@ -119,7 +110,7 @@ struct TreeRun {
       if (!std::equal(q, q + states.cols(), state))
         reader.evaluate(t, q, v, a);
     }
-    lambda.row(i) = Eigen::Map<const Eigen::RowVectorXd>(reader.workspace().lambda.data(), lambda.cols());
+    lambda.row(i) = Map<const RowVectorXd>(reader.workspace().lambda.data(), lambda.cols());
     if (replay) {
       const VectorXd &values = replay->source().values();
       if (replayed.cols() != values.size())
@@ -130,10 +121,10 @@ struct TreeRun {
 
   // What only the end of an integration tells
   template <class Space> void finish(RecursiveMotion<Space> &motion) {
-    motion.watch_posture(report.time, last.data());
-    postures = motion.postures();
+    motion.watch_posture(time, last.data());
+    static_cast<PostureHistory &>(*this) = motion.postures();
     for (auto *x : {&states, &accelerations, &lambda, &replayed})
-      x->conservativeResize(report.outputs, Eigen::NoChange);
+      x->conservativeResize(outputs, Eigen::NoChange);
   }
 };
 
@@ -178,7 +169,7 @@ TreeRun integrated(const Model<Space> &model, const Scene &scene, RecursiveMotio
     if (limits)
       limits->go_on(checkpoint->ranges);
   }
-  run.report = integrate(
+  static_cast<IntegrationReport &>(run) = integrate(
       motion, times, run.last, controls,
       [&](std::size_t i, double t, const double *state) {
         run.evaluate(i, t, state, reader, model.mechanism.n_q, true, replay);

@@ -10,10 +10,6 @@
 
 namespace ffrobot {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 namespace {
 
 constexpr double vanishing = 1e-12;      // eigenvalues of A^T A below this fraction of the largest are zeros
@@ -49,7 +45,7 @@ Allocation::Allocation(MatrixXd Phi, const MatrixXd &W_sqrt, MatrixXd gain, Vect
   held_.assign(k, 0);
 }
 
-const VectorXd &Allocation::solve(const Eigen::Ref<const VectorXd> &F) {
+const VectorXd &Allocation::solve(const Ref<const VectorXd> &F) {
   multiply_small(gain_, F.data(), V_.data());
   if ((V_.array() >= lower_.array()).all() && (V_.array() <= upper_.array()).all()) {
     u_ = V_.cwiseQuotient(scale_);

@@ -1,7 +1,7 @@
 // Voltages within limits: bounded weighted least squares, warm-started from one time to the next.
 #pragma once
 
-#include <Eigen/Core>
+#include "core/eigen.h"
 #include <Eigen/QR>
 #include <vector>
 
@@ -19,27 +19,26 @@ public:
   // Phi: (n, k) modal forces per volt; W_sqrt: (rows, n); gain: (k, n) the best voltages without limits, V = gain F,
   // which are taken wherever they are within the limits (of many the smallest relative to scale, so that V does not
   // jump where the first limit is met); lower, upper: (k), infinite where there is none; scale: (k) ordinary voltages.
-  Allocation(Eigen::MatrixXd Phi, const Eigen::MatrixXd &W_sqrt, Eigen::MatrixXd gain, Eigen::VectorXd lower,
-             Eigen::VectorXd upper, Eigen::VectorXd scale);
+  Allocation(MatrixXd Phi, const MatrixXd &W_sqrt, MatrixXd gain, VectorXd lower, VectorXd upper, VectorXd scale);
 
   // Voltages (k) for the modal forces F (n).
-  const Eigen::VectorXd &solve(const Eigen::Ref<const Eigen::VectorXd> &F);
+  const VectorXd &solve(const Ref<const VectorXd> &F);
 
-  const Eigen::MatrixXd &Phi() const { return Phi_; }
+  const MatrixXd &Phi() const { return Phi_; }
   unsigned long iterations() const { return iterations_; }
 
 private:
-  double bound(Eigen::Index j, double side) const { return (side > 0 ? upper_ : lower_)[j] / scale_[j]; } // of u
+  double bound(Index j, double side) const { return (side > 0 ? upper_ : lower_)[j] / scale_[j]; } // of u
   bool move();
   void minimise();
   bool release();
 
-  Eigen::MatrixXd Phi_, gain_, W_sqrt_, A_; // A u = d with u = V / scale: W_sqrt Phi scale u = W_sqrt F, ridge u = 0
-  Eigen::VectorXd lower_, upper_, scale_;
-  Eigen::VectorXd V_, u_, d_, left_, gradient_, target_; // left: d - A u
-  std::vector<int> held_;                                // sign of the limit at which a voltage is held, 0 where free
-  std::vector<Eigen::Index> free_, factorised_;
-  Eigen::HouseholderQR<Eigen::MatrixXd> qr_{Eigen::MatrixXd::Identity(1, 1)}; // copied before it is of anything
+  MatrixXd Phi_, gain_, W_sqrt_, A_; // A u = d with u = V / scale: W_sqrt Phi scale u = W_sqrt F, ridge u = 0
+  VectorXd lower_, upper_, scale_;
+  VectorXd V_, u_, d_, left_, gradient_, target_; // left: d - A u
+  std::vector<int> held_;                         // sign of the limit at which a voltage is held, 0 where free
+  std::vector<Index> free_, factorised_;
+  Eigen::HouseholderQR<MatrixXd> qr_{MatrixXd::Identity(1, 1)}; // copied before it is of anything
   unsigned long iterations_ = 0;
 };
 

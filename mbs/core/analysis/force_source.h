@@ -3,7 +3,7 @@
 
 #include "core/time_function/time_function.h"
 
-#include <Eigen/Core>
+#include "core/eigen.h"
 
 #include <limits>
 #include <memory>
@@ -15,10 +15,10 @@ namespace ffrobot {
 // Forces and voltages, number by number.
 class ForceSource {
 public:
-  explicit ForceSource(Eigen::Index count) : values_(Eigen::VectorXd::Zero(count)) {}
+  explicit ForceSource(Index count) : values_(VectorXd::Zero(count)) {}
   virtual ~ForceSource() = default;
 
-  const Eigen::VectorXd &values() const { return values_; } // (count) of the last evaluate()
+  const VectorXd &values() const { return values_; } // (count) of the last evaluate()
 
   // Values are those of time t afterwards. Costs nothing where they are already: stages of a step and outputs meet.
   void evaluate(double t) {
@@ -38,7 +38,7 @@ protected:
   virtual bool find(double t) = 0;
   virtual void prepare(const double *, int) {}
 
-  Eigen::VectorXd values_;
+  VectorXd values_;
 
 private:
   static constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();

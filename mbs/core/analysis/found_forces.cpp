@@ -8,9 +8,6 @@
 
 namespace ffrobot::recursion {
 
-using Eigen::Index;
-using Eigen::VectorXd;
-
 template <class Space>
 RecordedForces<Space>::RecordedForces(const Mechanism<Space> &mechanism, const Scene &scene, const Recording &recording,
                                       std::shared_ptr<ForceReader<Space>> reader)
@@ -82,10 +79,10 @@ void PathReader<Space>::read(const double *, const Workspace<Space, double> &w, 
       continue;
     }
     ConstraintMotion<double> motion;
-    constraint_motion(mechanism_, of, w, of.moves, motion);
-    Eigen::Map<Eigen::Vector3d> force(to + column), moment(to + column + 3);
-    force += size * axes_ * Eigen::Map<const Eigen::Vector3d>(motion.force);
-    moment += size * axes_ * Eigen::Map<const Eigen::Vector3d>(sign > 0 ? motion.moment_b : motion.moment_a);
+    constraint_motion(of, w, of.moves, motion);
+    Map<Vector3d> force(to + column), moment(to + column + 3);
+    force += size * axes_ * Map<const Vector3d>(motion.force);
+    moment += size * axes_ * Map<const Vector3d>(sign > 0 ? motion.moment_b : motion.moment_a);
   }
 }
 
@@ -98,11 +95,11 @@ Index PointReader::count() const {
 
 namespace {
 
-Eigen::MatrixXd L_a(const PointComponents &of, const Eigen::Ref<const VectorXd> &p) {
-  Eigen::MatrixXd found(6 + p.size(), of.direction.cols());
+MatrixXd L_a(const PointComponents &of, const Ref<const VectorXd> &p) {
+  MatrixXd found(6 + p.size(), of.direction.cols());
   for (Index k = 0; k < found.cols(); ++k) {
     const ConstMatrix Phi = of.Phi.middleRows<3>(3 * k);
-    const Eigen::Vector3d e = of.direction.col(k), u = of.position.col(k) + matrix_product(Phi, p);
+    const Vector3d e = of.direction.col(k), u = of.position.col(k) + matrix_product(Phi, p);
     found.col(k) << e, u.cross(e), VectorXd::Zero(p.size());
     add_transposed_product(Phi, e, found.col(k).tail(p.size()));
   }
@@ -116,11 +113,11 @@ void PointReader::read(const double *q, const Workspace<Spatial, double> &w, con
   for (const PointComponents &of : bodies_) {
     const std::size_t i = of.node;
     const auto &node = mechanism_.nodes[i];
-    const Eigen::Map<const VectorXd> p(q + node.p_q(), node.n());
+    const Map<const VectorXd> p(q + node.p_q(), node.n());
     LeastNorm solver;
     solver.compute(of.scale.asDiagonal() * L_a(of, p));
     VectorXd Q_a = on_bodies[i];
-    const Eigen::Vector3d on_frame = Q_a.head<3>(), about_frame = Q_a.segment<3>(3);
+    const Vector3d on_frame = Q_a.head<3>(), about_frame = Q_a.segment<3>(3);
     Q_a.head<3>() = of.axes.transpose() * on_frame;
     Q_a.segment<3>(3) = of.axes.transpose() * (about_frame - of.origin.cross(on_frame));
     if (shape)
@@ -128,7 +125,7 @@ void PointReader::read(const double *q, const Workspace<Spatial, double> &w, con
     Q_a.array() *= of.scale.array();
     const VectorXd force = solver.solve(Q_a);
     for (Index k = 0; k < force.size(); ++k, to += 3) {
-      const Eigen::Vector3d local = of.axes * (force[k] * of.direction.col(k));
+      const Vector3d local = of.axes * (force[k] * of.direction.col(k));
       turn(w.bodies[i].absolute, local.data(), to);
     }
   }

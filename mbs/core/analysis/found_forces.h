@@ -15,10 +15,10 @@ namespace ffrobot::recursion {
 template <class Space> class ForceReader {
 public:
   virtual ~ForceReader() = default;
-  virtual Eigen::Index count() const = 0;
+  virtual Index count() const = 0;
   // Of q (n_q), with the kinematics and multipliers of w: writes (count) numbers. `shape` (n_v): forces that hold
   // prescribed modes, zero along joints; null: none.
-  virtual void read(const double *q, const Workspace<Space, double> &w, const Eigen::VectorXd *shape, double *to) = 0;
+  virtual void read(const double *q, const Workspace<Space, double> &w, const VectorXd *shape, double *to) = 0;
 };
 
 // The recorded run made again. Mechanism, scene and recording must outlive this.
@@ -41,7 +41,7 @@ private:
 // The motion, which must outlive this, is solved anew at every time, first from the posture q (n_q).
 template <class Space> class PrescribedForces final : public ForceSource {
 public:
-  PrescribedForces(PrescribedMotion<Space> &motion, std::vector<ModalShape> shape, const Eigen::VectorXd &q,
+  PrescribedForces(PrescribedMotion<Space> &motion, std::vector<ModalShape> shape, const VectorXd &q,
                    std::shared_ptr<ForceReader<Space>> reader);
 
 private:
@@ -49,7 +49,7 @@ private:
 
   PrescribedMotion<Space> &motion_;
   std::vector<ModalShape> shape_;
-  Eigen::VectorXd holding_; // (n_v)
+  VectorXd holding_; // (n_v)
   std::shared_ptr<ForceReader<Space>> reader_;
 };
 
@@ -57,24 +57,24 @@ private:
 // `reached` (reached, modes).
 struct LinkPatches {
   int first;
-  Eigen::MatrixXd reached;
+  MatrixXd reached;
   Allocation allocation;
 };
 
 // Forces of motors (N m or N) within their limits, then voltages of patches for the modal forces that are left.
 template <class Space> class ActuatorReader final : public ForceReader<Space> {
 public:
-  ActuatorReader(DrivenMechanism<Space> driven, Eigen::VectorXd limit, std::vector<LinkPatches> patches);
+  ActuatorReader(DrivenMechanism<Space> driven, VectorXd limit, std::vector<LinkPatches> patches);
 
-  Eigen::Index count() const override;
-  void read(const double *q, const Workspace<Space, double> &w, const Eigen::VectorXd *shape, double *to) override;
+  Index count() const override;
+  void read(const double *q, const Workspace<Space, double> &w, const VectorXd *shape, double *to) override;
 
 private:
   DrivenMechanism<Space> driven_;
   Motors<Space> motors_;
-  Eigen::VectorXd limit_;
+  VectorXd limit_;
   std::vector<LinkPatches> patches_;
-  Eigen::VectorXd modal_, reached_; // (n_v) for patches; what those of a link reach of it
+  VectorXd modal_, reached_; // (n_v) for patches; what those of a link reach of it
 };
 
 // Forces -lambda of constraint equations: along joint coordinates as they are, and of others the force and the moment
@@ -86,17 +86,17 @@ public:
     double sign;     // of a coordinate; on section b 1, on section a -1
   };
   // axes (3, 3): columns are the axes of the mechanism, global axes
-  PathReader(const Mechanism<Space> &mechanism, Eigen::Matrix3d axes, std::vector<Part> parts, Eigen::Index count)
+  PathReader(const Mechanism<Space> &mechanism, Matrix3d axes, std::vector<Part> parts, Index count)
       : mechanism_(mechanism), axes_(std::move(axes)), parts_(std::move(parts)), count_(count) {}
 
-  Eigen::Index count() const override { return count_; }
-  void read(const double *q, const Workspace<Space, double> &w, const Eigen::VectorXd *shape, double *to) override;
+  Index count() const override { return count_; }
+  void read(const double *q, const Workspace<Space, double> &w, const VectorXd *shape, double *to) override;
 
 private:
   const Mechanism<Space> &mechanism_;
-  Eigen::Matrix3d axes_;
+  Matrix3d axes_;
   std::vector<Part> parts_;
-  Eigen::Index count_;
+  Index count_;
 };
 
 // Components of force at points of one body, along axes of its frame: as close to L_a F_a = Q_a (Shabana 2022, Eqs. 9
@@ -104,11 +104,11 @@ private:
 // u = x + Phi p: [e; u x e; Phi^T e].
 struct PointComponents {
   int node;
-  Eigen::Matrix3d axes;                 // of the body's data, in axes of the frame: columns
-  Eigen::Vector3d origin;               // likewise
+  Matrix3d axes;                        // of the body's data, in axes of the frame: columns
+  Vector3d origin;                      // likewise
   Eigen::Matrix3Xd direction, position; // (3, c) e and x
-  Eigen::MatrixXd Phi;                  // (3 c, n)
-  Eigen::VectorXd scale;
+  MatrixXd Phi;                         // (3 c, n)
+  VectorXd scale;
 };
 
 // Forces of a path as forces at points, global axes: (3) of each component.
@@ -117,8 +117,8 @@ public:
   PointReader(const DrivenMechanism<Spatial> &driven, std::vector<PointComponents> bodies)
       : mechanism_(driven.mechanism), path_(driven), bodies_(std::move(bodies)) {}
 
-  Eigen::Index count() const override;
-  void read(const double *q, const Workspace<Spatial, double> &w, const Eigen::VectorXd *shape, double *to) override;
+  Index count() const override;
+  void read(const double *q, const Workspace<Spatial, double> &w, const VectorXd *shape, double *to) override;
 
 private:
   const Mechanism<Spatial> &mechanism_;

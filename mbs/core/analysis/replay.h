@@ -12,8 +12,8 @@ namespace ffrobot::recursion {
 class Replay final : public ExternalForces {
 public:
   struct AtPoint {
-    Eigen::Index number; // of the source's
-    Eigen::Index entry;  // in wrenches
+    Index number; // of the source's
+    Index entry;  // in wrenches
     double share;
   };
   // `along`: what units of all numbers of the source do along v.

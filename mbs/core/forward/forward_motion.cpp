@@ -7,50 +7,11 @@
 
 namespace ffrobot {
 
-namespace recursion {
-
-template <class Archive> void fields(Archive &a, SpatialMarker &x) {
-  archived_all(a, x.position, x.triad, x.Phi, x.K, x.turns);
-}
-template <class Archive> void fields(Archive &a, SpatialData &x) {
-  archived_all(a, x.mass, x.first_moment, x.J2, x.stiffness, x.damping, x.S_bar, x.I_bar, x.S_bar_kl, x.K_s, x.K_x,
-               x.J_spin, x.h_spin, x.S_spin, x.spin_axis, x.spin_booked, x.markers);
-}
-template <class Archive> void fields(Archive &a, BodyModel<SpatialData> &x) {
-  archived_all(a, x.name, x.parent, x.parent_marker, x.inboard_marker, x.joint, x.lead, x.rotor_inertia, x.gear_ratio,
-               x.driven, x.of_section, x.data);
-}
-template <class Archive> void fields(Archive &a, MarkerAt &x) { archived_all(a, x.body, x.marker); }
-template <class Archive> void fields(Archive &a, ConstraintModel &x) {
-  archived_all(a, x.name, x.kind, x.a, x.b, x.f, x.g, x.coordinate);
-}
-template <class Archive> void fields(Archive &a, JointForce &x) {
-  archived_all(a, x.q, x.v, x.stiffness, x.rest, x.friction.viscous, x.friction.coulomb, x.friction.speed);
-}
-template <class Archive> void fields(Archive &a, GearSpring &x) {
-  archived_all(a, x.a.q, x.a.v, x.b.q, x.b.v, x.ratio, x.spring.slopes, x.spring.knots, x.damping);
-}
-
-template <class Archive> void fields(Archive &a, CutJoint &x) {
-  archived_all(a, x.a, x.b, x.turns, x.axis, x.friction.viscous, x.friction.coulomb, x.friction.speed);
-}
-
-} // namespace recursion
-
-template <class Archive> void fields(Archive &a, LinearOutput &x) { archived_all(a, x.entries, x.weights); }
-template <class Archive> void fields(Archive &a, PlaceOutput &x) { archived_all(a, x.body, x.position, x.Phi, x.K); }
-template <class Archive> void fields(Archive &a, ForwardModel &x) {
-  archived_all(a, x.guid, x.bodies, x.ground, x.rows, x.gravity, x.joint_forces, x.gears, x.wrenches, x.cut_joints,
-               x.inputs, x.linear, x.places, x.q, x.v, x.method, x.spectral_radius, x.tolerance, x.duration);
-}
-
 namespace {
 
 using namespace recursion;
-using Eigen::Index;
-using Eigen::VectorXd;
 
-const std::string head = "ffrobot held motion 5\n"; // another number wherever fields() change
+const std::string head = "ffrobot held motion 5\n"; // another number wherever fields change
 
 void check(bool holds, const char *expected) {
   if (!holds)
@@ -149,12 +110,12 @@ const std::vector<double> &ForwardMotion::outputs() {
   const double *q = y_.data(), *v = q + mechanism_.n_q;
   VectorXd a(mechanism_.n_v);
   motion_->evaluate(0, q, v, a.data());
-  const auto frames = frame_motions(mechanism_, q, v, motion_->workspace());
+  const auto frames = frame_motions(q, v, motion_->workspace());
   for (const PlaceOutput &output : model_.places) {
     const std::size_t number = output.body;
     const auto &node = mechanism_.nodes[number];
     const auto &body = model_.bodies[number];
-    Eigen::Vector3d x = output.position;
+    Vector3d x = output.position;
     if (node.n()) {
       const auto p = y_.segment(node.p_q(), node.n());
       x += output.Phi * p;

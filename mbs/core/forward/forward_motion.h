@@ -1,6 +1,7 @@
 // The motion of a robot in space under inputs that are held over steps, without Python: what an FMU runs.
 #pragma once
 
+#include "core/fields.h"
 #include "core/integrate/integrate.h"
 #include "core/recursion/inverse/observe.h"
 #include "core/recursion/motion/motion.h"
@@ -15,14 +16,18 @@ namespace ffrobot {
 struct LinearOutput {
   std::vector<int> entries;
   std::vector<double> weights;
+
+  FFROBOT_FIELDS(entries, weights);
 };
 
 // Three outputs, the place of a section in global axes (m): r + A (position + Phi p - 1/2 p^T K p).
 struct PlaceOutput {
   int body = 0;
-  Eigen::Vector3d position = Eigen::Vector3d::Zero(); // m, body axes
-  Eigen::MatrixXd Phi;                                // (3, n)
-  std::vector<Eigen::MatrixXd> K;                     // three (n, n) of geometric stiffening; empty without
+  Vector3d position = Vector3d::Zero(); // m, body axes
+  MatrixXd Phi;                         // (3, n)
+  std::vector<MatrixXd> K;              // three (n, n) of geometric stiffening; empty without
+
+  FFROBOT_FIELDS(body, position, Phi, K);
 };
 
 // Everything that such a motion needs; rows close loops.
@@ -31,19 +36,22 @@ struct ForwardModel {
   std::vector<recursion::BodyModel<recursion::SpatialData>> bodies;
   std::vector<recursion::SpatialMarker> ground;
   std::vector<recursion::ConstraintModel> rows;
-  Eigen::VectorXd gravity; // (3) m/s^2
+  VectorXd gravity; // (3) m/s^2
   std::vector<recursion::JointForce> joint_forces;
   std::vector<recursion::GearSpring> gears;
   std::vector<recursion::MarkerAt> wrenches; // those of cut joints
   std::vector<recursion::CutJoint> cut_joints;
-  std::vector<Eigen::VectorXd> inputs; // (n_v) generalized forces of a unit of each
-  std::vector<LinearOutput> linear;    // outputs, before those of `places`
+  std::vector<VectorXd> inputs;     // (n_v) generalized forces of a unit of each
+  std::vector<LinearOutput> linear; // outputs, before those of `places`
   std::vector<PlaceOutput> places;
-  Eigen::VectorXd q, v; // at the start
+  VectorXd q, v; // at the start
   MethodKind method = MethodKind::dop853;
   double spectral_radius = 0.8; // of generalized-alpha
   double tolerance = 1e-6;      // over `duration` (s)
   double duration = 1;
+
+  FFROBOT_FIELDS(guid, bodies, ground, rows, gravity, joint_forces, gears, wrenches, cut_joints, inputs, linear, places,
+                 q, v, method, spectral_radius, tolerance, duration);
 };
 
 std::string bytes_of(const ForwardModel &model);
@@ -52,7 +60,7 @@ ForwardModel forward_model_of(const std::string &bytes);
 
 // Where a motion is, and how its integration came there.
 struct ForwardState {
-  Eigen::VectorXd y; // (q, v)
+  VectorXd y; // (q, v)
   IntegrationCheckpoint steps;
   recursion::MotionHistory motion;
   std::vector<double> inputs;
@@ -85,7 +93,7 @@ private:
   ForwardModel model_;
   recursion::Mechanism<recursion::Spatial> mechanism_;
   recursion::Scene scene_;
-  Eigen::VectorXd y_;                                                    // (q, v)
+  VectorXd y_;                                                           // (q, v)
   std::optional<recursion::RecursiveMotion<recursion::Spatial>> motion_; // there from the constructor on
   IntegrationCheckpoint history_;                                        // of the step before
   std::vector<double> inputs_, outputs_;

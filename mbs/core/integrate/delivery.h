@@ -101,7 +101,7 @@ private:
   Recording *recording_;
   Samples *samples_;
   std::size_t outputs_ = 0;
-  Eigen::VectorXd z_output_;
+  VectorXd z_output_;
 };
 
 } // namespace ffrobot

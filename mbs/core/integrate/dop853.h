@@ -17,7 +17,7 @@ public:
 
   bool step(double t, const double *y, double h, double) override {
     run_stages<Tableau, 1, Tableau::stages - 1>(system_, t, y, h, K_, stage_);
-    for_entries<6>(n_, [&]<class T, int parts>(Eigen::Index i) __attribute__((always_inline)) {
+    for_entries<6>(n_, [&]<class T, int parts>(Index i) __attribute__((always_inline)) {
       const Combination<Tableau::b, Tableau::stages, T, parts> of(K_.data(), n_, i);
 #pragma GCC unroll 8
       for (int part = 0; part < parts; ++part, i += of.width) {
@@ -31,15 +31,15 @@ public:
   // Estimate of order 5, times a factor that the estimate of order 3 brings it down by: together they shrink as h^8. A
   // coordinate and its rate have one factor, and every pair its own: large slow motion, whose estimate of order 5 is
   // far below that of order 3, would bring the error of fast vibration down as well.
-  void estimate(double h, Eigen::VectorXd &error) override {
+  void estimate(double h, VectorXd &error) override {
     constexpr double least = std::numeric_limits<double>::min(); // where nothing moves there is no error
-    const Eigen::Index n_v = n_ / 2;
-    for_entries<1>(n_v, [&]<class T, int>(Eigen::Index i) __attribute__((always_inline)) {
-      const Eigen::Index i_v = n_v + i;
-      const auto of5 = [&](Eigen::Index at) __attribute__((always_inline)) {
+    const Index n_v = n_ / 2;
+    for_entries<1>(n_v, [&]<class T, int>(Index i) __attribute__((always_inline)) {
+      const Index i_v = n_v + i;
+      const auto of5 = [&](Index at) __attribute__((always_inline)) {
         return Combination<Tableau::e5, Tableau::stages, T, 1>(K_.data(), n_, at).sum[0];
       };
-      const auto of3 = [&](Eigen::Index at) __attribute__((always_inline)) {
+      const auto of3 = [&](Index at) __attribute__((always_inline)) {
         return read_at<T>(mean_.data() + at) +
                Combination<Tableau::e3_beside_b, Tableau::stages, T, 1>(K_.data(), n_, at).sum[0];
       };
@@ -57,7 +57,7 @@ public:
     run_stages<Tableau, Tableau::stages + 1, Tableau::dense_stages - 1>(system_, t, y, h, K_, stage_);
     t0_ = t;
     h_ = h;
-    for_entries<1>(n_, [&]<class T, int>(Eigen::Index i) __attribute__((always_inline)) {
+    for_entries<1>(n_, [&]<class T, int>(Index i) __attribute__((always_inline)) {
       const T start = read_at<T>(y + i), way = read_at<T>(end_.data() + i) - start;
       const T first = h * read_at<T>(K_.data() + i), last = h * read_at<T>(last_slope() + i);
       double *F = F_.data() + i;
@@ -72,7 +72,7 @@ public:
   // The last term of the interpolation is at most (4/7)^4 (3/7)^3 of its coefficient. On a vibration of 0.3 to 7
   // radians a step it is 6 to 7 times the largest error, which is 3 times the estimate of the step as long as that is
   // stable and 8 times where it is not.
-  bool estimate_dense(Eigen::VectorXd &error) const override {
+  bool estimate_dense(VectorXd &error) const override {
     constexpr double largest_of_last = 0.0084, of_error = 6;
     error = largest_of_last / of_error * F_.col(Tableau::dense_order - 1);
     return true;
@@ -90,13 +90,12 @@ private:
   }
 
   // Weighted sum of the slopes in row k of the dense output
-  template <class Of, int k, class T>
-  [[gnu::always_inline]] static T dense_sum(const double *K, Eigen::Index n, Eigen::Index i) {
+  template <class Of, int k, class T> [[gnu::always_inline]] static T dense_sum(const double *K, Index n, Index i) {
     static constexpr auto &row = Of::d[k];
     return Combination<row, Of::dense_stages, T, 1>(K, n, i).sum[0];
   }
 
-  Eigen::VectorXd mean_; // of the slopes of the step, by weights
+  VectorXd mean_; // of the slopes of the step, by weights
 };
 
 } // namespace ffrobot

@@ -19,8 +19,8 @@ public:
     advance<Tableau::b, Tableau::stages>(K_.data(), n_, h, y, end_.data());
     return true;
   }
-  void estimate(double h, Eigen::VectorXd &error) override {
-    for_entries<1>(n_, [&]<class T, int>(Eigen::Index i) __attribute__((always_inline)) {
+  void estimate(double h, VectorXd &error) override {
+    for_entries<1>(n_, [&]<class T, int>(Index i) __attribute__((always_inline)) {
       const Combination<Tableau::e, Tableau::dense_stages, T, 1> of(K_.data(), n_, i);
       write_at(error.data() + i, h * of.sum[0]);
     });
@@ -31,12 +31,12 @@ public:
   void prepare_dense(double t, const double *y, double h) override {
     t0_ = t;
     h_ = h;
-    start_ = Eigen::Map<const Eigen::VectorXd>(y, n_);
+    start_ = Map<const VectorXd>(y, n_);
     F_.col(0) = end_ - start_;
     F_.col(1) = h * K_.col(0) - F_.col(0);
     F_.col(2) = F_.col(0) - h * K_.col(Tableau::stages) - F_.col(1);
     F_.col(3).setZero();
-    for (Eigen::Index j = 0; j < Tableau::dense_stages; ++j)
+    for (Index j = 0; j < Tableau::dense_stages; ++j)
       F_.col(3) += (h * Tableau::d[j]) * K_.col(j);
   }
 };

@@ -1,6 +1,7 @@
 // How large the error of a step may be: its share of the tolerance, and what a reserve adds to it.
 #pragma once
 
+#include "core/fields.h"
 #include <algorithm>
 
 namespace ffrobot {
@@ -12,9 +13,11 @@ struct StepHistory {
   double next_step = 0;                         // s
   double usual_step = 0;                        // s, the largest of the last ones
   double reserve = 1;                           // what is left of it, in terms of the tolerance
-  double previous_step = 0, previous_error = 1; // s, and relative to the largest error allowed; of StepControl
+  double previous_step = 0, previous_error = 1; // s, and relative to the largest error allowed
   bool in_transient = false;                    // vibrations of the start are still being damped away
   int without_look = 0;                         // tries to come that are not looked at for rounding
+
+  FFROBOT_FIELDS(next_step, usual_step, reserve, previous_step, previous_error, in_transient, without_look);
 };
 
 // Of one step: as parts of the tolerance, without and with the reserve, and in the unit of errors.

@@ -20,7 +20,7 @@ public:
   // A polynomial in the share x of the step and in 1 - x, by turns
   void interpolate(double t, double *y) const final {
     const double x = (t - t0_) / h_;
-    for_entries<1>(n_, [&]<class T, int>(Eigen::Index i) __attribute__((always_inline)) {
+    for_entries<1>(n_, [&]<class T, int>(Index i) __attribute__((always_inline)) {
       T out{};
       for (int k = Tableau::dense_order - 1; k >= 0; --k)
         out = (k % 2 == 0 ? x : 1 - x) * (out + read_at<T>(F_.data() + k * n_ + i));
@@ -34,14 +34,14 @@ public:
 
 protected:
   explicit ExplicitMethod(OdeSystem &system)
-      : system_(system), n_(system.size()), K_(Eigen::MatrixXd::Zero(n_, Tableau::dense_stages)), stage_(n_), end_(n_),
+      : system_(system), n_(system.size()), K_(MatrixXd::Zero(n_, Tableau::dense_stages)), stage_(n_), end_(n_),
         start_(n_), F_(n_, Tableau::dense_order) {}
 
   OdeSystem &system_;
-  Eigen::Index n_;
-  Eigen::MatrixXd K_; // slopes, (n, dense_stages)
-  Eigen::VectorXd stage_, end_, start_;
-  Eigen::MatrixXd F_; // (n, dense_order)
+  Index n_;
+  MatrixXd K_; // slopes, (n, dense_stages)
+  VectorXd stage_, end_, start_;
+  MatrixXd F_; // (n, dense_order)
   double t0_ = 0, h_ = 0;
 };
 

@@ -1,6 +1,7 @@
 // Which of two methods gets further for the same work, found out while an integration runs.
 #pragma once
 
+#include "core/fields.h"
 #include "core/integrate/method.h"
 
 #include <vector>
@@ -23,6 +24,8 @@ struct MethodHistory {
   unsigned long tries = 0;  // steps that it has tried from `since` on
   unsigned long window = 0; // of them, between measurements
   unsigned long trial = 0;  // of them, before the other is tried
+
+  FFROBOT_FIELDS(second, pace_of_other, since, measured, tries, window, trial);
 };
 
 // What is expected of a method may be wrong, and one that was slow may do better when vibrations have died out. The

@@ -4,8 +4,7 @@
 
 namespace ffrobot {
 
-using Eigen::VectorXd;
-using VectorMap = Eigen::Map<const VectorXd>;
+using VectorMap = Map<const VectorXd>;
 
 namespace {
 
@@ -17,12 +16,11 @@ constexpr double slow_contraction = 0.02; // geometry is taken anew when Newton'
 } // namespace
 
 GeneralizedAlpha::GeneralizedAlpha(OdeSystem &system, double spectral_radius)
-    : system_(system), project_(system), n_(system.n_v()), alpha_m_((2 * spectral_radius - 1) / (spectral_radius + 1)),
+    : ImplicitMethod(system), alpha_m_((2 * spectral_radius - 1) / (spectral_radius + 1)),
       alpha_f_(spectral_radius / (spectral_radius + 1)), beta_(0.25 * std::pow(1 + alpha_f_ - alpha_m_, 2)),
       gamma_(0.5 + alpha_f_ - alpha_m_), leading_((1 - alpha_m_) / (1 - alpha_f_)), v_dot_(n_), next_v_dot_(n_),
-      previous_v_dot_(n_), drift_(n_), a_(n_), next_a_(n_), position_correction_(n_), end_(2 * n_), start_(2 * n_),
-      first_slope_(2 * n_), last_slope_(2 * n_), change_(2 * n_), excess_(n_), force_(system.n_stiff()), x_(n_),
-      value_(system.constraints()), rate_(value_), c_(value_) {}
+      previous_v_dot_(n_), drift_(n_), a_(n_), next_a_(n_), position_correction_(n_), change_(2 * n_), excess_(n_),
+      x_(n_), c_(value_) {}
 
 // Consistent initial accelerations, C_tt included, are the first slope. The method's own lie alpha_m - alpha_f steps
 // ahead: their rate is taken from a difference.
@@ -113,13 +111,6 @@ bool GeneralizedAlpha::step(double t, const double *y, double h, double toleranc
   return false;
 }
 
-bool GeneralizedAlpha::finish(double t) {
-  if (!project_(t, end_.data()))
-    return false;
-  system_.slope(t, end_.data(), last_slope_.data());
-  return true;
-}
-
 // Against the integral of the parabola through the last three accelerations (order 3), smoothed by N^-1 M: a difference
 // of accelerations is large in stiff modes, what it does to them is not. The first step has a straight line only.
 void GeneralizedAlpha::estimate(double h, VectorXd &error) {
@@ -150,15 +141,9 @@ void GeneralizedAlpha::accept(double h) {
   previous_step_ = h;
 }
 
-void GeneralizedAlpha::prepare_dense(double t, const double *y, double h) {
-  start_ = VectorMap(y, 2 * n_);
-  t0_ = t;
-  h_ = h;
-}
-
 void GeneralizedAlpha::interpolate(double t, double *y) const {
   const double x = (t - t0_) / h_, r = 1 - x;
-  Eigen::Map<VectorXd>(y, 2 * n_) =
+  Map<VectorXd>(y, 2 * n_) =
       r * r * (1 + 2 * x) * start_ + x * x * (1 + 2 * r) * end_ + x * r * h_ * (r * first_slope_ - x * last_slope_);
 }
 

@@ -4,19 +4,17 @@
 // by the multipliers of the equations of motion, positions meet C = 0 by multipliers of their own.
 #pragma once
 
-#include "core/integrate/implicit_projection.h"
-#include "core/integrate/method.h"
+#include "core/integrate/implicit_method.h"
 
 namespace ffrobot {
 
-class GeneralizedAlpha final : public Method {
+class GeneralizedAlpha final : public ImplicitMethod {
 public:
   // spectral_radius: what a step leaves of vibrations far above 1 / h; 1: no damping, 0: all of it
   GeneralizedAlpha(OdeSystem &system, double spectral_radius);
 
   bool step(double t, const double *y, double h, double tolerance) override;
-  bool finish(double t) override;
-  void estimate(double h, Eigen::VectorXd &error) override;
+  void estimate(double h, VectorXd &error) override;
   double error_order() const override { return 3; }
   double error_share(double fraction) const override { return fraction; }
   void accept(double h) override;
@@ -25,30 +23,21 @@ public:
     previous_step_ = 0;
   }
 
-  bool lands_on_outputs() const override { return true; }
-  void prepare_dense(double t, const double *y, double h) override;
   void interpolate(double t, double *y) const override; // cubic Hermite polynomial
-
-  double *end() override { return end_.data(); }
-  double *first_slope() override { return first_slope_.data(); }
-  double *last_slope() override { return last_slope_.data(); }
 
 private:
   void start(double t, const double *y, double h);
   void advance(const double *y, double h); // end_ from the accelerations
   bool iterate(double t, const double *y, double h, bool is_first);
-  void stiff_force(const Eigen::VectorXd &x); // force_, with B^T force_ = (N - M) x
+  void stiff_force(const VectorXd &x); // force_, with B^T force_ = (N - M) x
 
-  OdeSystem &system_;
-  ImplicitProjection project_;
-  Eigen::Index n_; // n_v
   double alpha_m_, alpha_f_, beta_, gamma_, leading_;
   double damping_factor_ = 0, stiffness_factor_ = 0;
   // v_dot: accelerations at the start, end and before; a: the method's own, behind them by alpha_m - alpha_f steps
-  Eigen::VectorXd v_dot_, next_v_dot_, previous_v_dot_, drift_, a_, next_a_, position_correction_;
-  Eigen::VectorXd end_, start_, first_slope_, last_slope_, change_, excess_, force_, x_, value_, rate_, c_;
-  double previous_step_ = 0, t0_ = 0, h_ = 0;
-  bool started_ = false, stale_ = true; // the geometry of the last factorisation
+  VectorXd v_dot_, next_v_dot_, previous_v_dot_, drift_, a_, next_a_, position_correction_;
+  VectorXd change_, excess_, x_, c_;
+  double previous_step_ = 0;
+  bool started_ = false;
 };
 
 } // namespace ffrobot

@@ -58,7 +58,7 @@ struct Attempt {
 
 class Integration {
 public:
-  Integration(OdeSystem &system, const std::vector<double> &times, const Eigen::VectorXd &y,
+  Integration(OdeSystem &system, const std::vector<double> &times, const VectorXd &y,
               const IntegrationControls &controls, const StateFunctionOfTime &output,
               const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks,
               LimitWatch *limits, Samples *samples)
@@ -97,7 +97,6 @@ public:
     make_method_at_work();
     is_repeatable_ = is_repeatable;
     steps_ = checkpoint.steps;
-    control_.go_on(steps_.previous_step, steps_.previous_error);
     system_.slope(t_, z_.data(), method_->first_slope());
     delivery_.go_on(checkpoint.outputs);
   }
@@ -115,15 +114,10 @@ public:
     return report_;
   }
 
-  Eigen::VectorXd final_state() const {
-    return Eigen::Map<const Eigen::VectorXd>(state(z_.data()), system_.local().state_size());
-  }
+  VectorXd final_state() const { return Map<const VectorXd>(state(z_.data()), system_.local().state_size()); }
 
   IntegrationCheckpoint checkpoint() const {
-    StepHistory steps = steps_;
-    steps.previous_step = control_.previous_step();
-    steps.previous_error = control_.previous_error();
-    return {t_, final_state(), steps, delivery_.outputs(), methods_.history()};
+    return {t_, final_state(), steps_, delivery_.outputs(), methods_.history()};
   }
 
 private:
@@ -246,7 +240,7 @@ private:
 
   // What of that size is more than rounding
   double beyond_rounding(const Attempt &attempt, const Allowance &allowance, double size) {
-    const Eigen::VectorXd &left =
+    const VectorXd &left =
         rounding_.error(t_, z_.data(), method_->first_slope(), attempt.step, *method_, error_, steps_.without_look);
     if (left.isZero(0))
       return size;
@@ -286,7 +280,7 @@ private:
         attempt.is_limited || (t_ == attempt.target && (breaks_ || jump_ || !controls_.stops.empty()));
     if (!(ends_early && 2 * attempt.step < steps_.next_step))
       steps_.next_step = control_.after_accepted(
-          asked, asked > attempt.step ? size * std::pow(asked / attempt.step, method_->error_order()) : size);
+          asked, asked > attempt.step ? size * std::pow(asked / attempt.step, method_->error_order()) : size, steps_);
     if (pass_breaks()) {
       system_.slope(t_, z_.data(), method_->first_slope());
       method_->restart();
@@ -311,7 +305,7 @@ private:
   void move_to_end(const Attempt &attempt) {
     t_ = attempt.end;
     method_->accept(attempt.step);
-    z_ = Eigen::Map<const Eigen::VectorXd>(method_->end(), system_.size());
+    z_ = Map<const VectorXd>(method_->end(), system_.size());
     std::copy_n(method_->last_slope(), system_.size(), method_->first_slope());
     if (system_.local().recentre(z_.data(), method_->first_slope()))
       method_->recentred();
@@ -374,8 +368,8 @@ private:
   std::optional<Jump> jump_;   // the next one that is known
   double searched_until_ = t_; // there is no other before
   Rounding rounding_;
-  double by_rounding_ = 0;    // part of the error of the step just tried
-  Eigen::VectorXd z_, error_; // local coordinates (ode.h)
+  double by_rounding_ = 0; // part of the error of the step just tried
+  VectorXd z_, error_;     // local coordinates (ode.h)
 };
 
 } // namespace
@@ -385,7 +379,7 @@ const MethodChoice &Recording::method_of(std::size_t step) const {
   return std::prev(after)->second;
 }
 
-IntegrationReport integrate(OdeSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
+IntegrationReport integrate(OdeSystem &system, const std::vector<double> &times, VectorXd &y,
                             const IntegrationControls &controls, const StateFunctionOfTime &output,
                             const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks,
                             IntegrationCheckpoint *checkpoint, LimitWatch *limits, Samples *samples) {

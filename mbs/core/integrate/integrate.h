@@ -2,6 +2,7 @@
 // method.h say.
 #pragma once
 
+#include "core/fields.h"
 #include "core/integrate/error_allowance.h"
 #include "core/integrate/faster_method.h"
 #include "core/integrate/limit_watch.h"
@@ -21,6 +22,8 @@ struct Recording {
   std::vector<std::pair<std::size_t, MethodChoice>> methods; // from the step that begins at times[first] on
 
   const MethodChoice &method_of(std::size_t step) const;
+
+  FFROBOT_FIELDS(times, states, tolerance, methods);
 };
 
 // States within a run, closer than its outputs: ends of steps, and times between them where steps are longer than
@@ -34,19 +37,23 @@ struct Samples {
   std::vector<double> times{};        // s
   std::vector<double> states{};       // (q, v) of each, one after the other
   unsigned long steps = 0, every = 1; // made so far; of them, the ends that are taken
+
+  FFROBOT_FIELDS(longest, most, parts, times, states, steps, every);
 };
 
 // Where an integration has stopped, and all that its next step depends on: the same candidates given, it goes on with
 // the method that was at work. Explicit ones go on as if nothing had been; what implicit ones extrapolate from earlier
 // steps is lost.
 struct IntegrationCheckpoint {
-  double time = 0;       // s
-  Eigen::VectorXd state; // (q, v); empty: the integration has not begun
+  double time = 0; // s
+  VectorXd state;  // (q, v); empty: the integration has not begun
   StepHistory steps;
   std::size_t outputs = 0; // delivered
   MethodHistory methods;
 
   bool has_begun() const { return state.size() > 0; }
+
+  FFROBOT_FIELDS(time, state, steps, outputs, methods);
 };
 
 enum class IntegrationStatus {
@@ -105,7 +112,7 @@ struct Breaks {
 // that has begun in an earlier call with the same `times` the integration goes on: neither outputs nor the `recording`,
 // which has to be the same, begin again, and max_steps counts anew; `limits` has to go on as well. It ends as that of
 // this call.
-IntegrationReport integrate(OdeSystem &system, const std::vector<double> &times, Eigen::VectorXd &y,
+IntegrationReport integrate(OdeSystem &system, const std::vector<double> &times, VectorXd &y,
                             const IntegrationControls &controls, const StateFunctionOfTime &output,
                             const std::function<bool(double)> &carry_on, Recording *recording,
                             const Breaks *breaks = nullptr, IntegrationCheckpoint *checkpoint = nullptr,

@@ -21,11 +21,11 @@ inline std::optional<Jump> find_jump(OdeSystem &system, const double *z, double 
   constexpr double part_of_change = 0.5; // that is there between neighbours still: what is only steep has none of it
   constexpr double least = 1e-9;         // of the largest accelerations so far: more than rounding
   constexpr double at_once = 1e-9;       // of the interval: what accelerations do to velocities meanwhile is nothing
-  Eigen::VectorXd left(system.size()), middle(left), right(left), change(left);
+  VectorXd left(system.size()), middle(left), right(left), change(left);
   system.slope(start, z, left.data());
   system.slope(end, z, right.data());
   const double rate = 1 / (at_once * (end - start));
-  const auto size = [&](const Eigen::VectorXd &from, const Eigen::VectorXd &to) {
+  const auto size = [&](const VectorXd &from, const VectorXd &to) {
     change = (to - from) / rate;
     return system.change_size(z, change.data(), rate);
   };

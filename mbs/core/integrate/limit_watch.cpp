@@ -8,8 +8,6 @@
 
 namespace ffrobot {
 
-using Eigen::Index;
-
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();

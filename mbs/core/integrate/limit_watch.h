@@ -3,6 +3,7 @@
 // method needs more slopes for its dense output, they are those of another system.
 #pragma once
 
+#include "core/fields.h"
 #include "core/integrate/method.h"
 
 #include <memory>
@@ -13,7 +14,7 @@ namespace ffrobot {
 
 // A number among the coordinates, and the range that it is meant to stay in. Infinite where one side has no limit.
 struct LimitedCoordinate {
-  Eigen::Index v = 0; // its place in v
+  Index v = 0; // its place in v
   double lowest, highest;
 };
 
@@ -21,6 +22,8 @@ struct LimitedCoordinate {
 struct RangeSeen {
   double least, largest;
   std::optional<double> left_at; // s: when it was first outside
+
+  FFROBOT_FIELDS(least, largest, left_at);
 };
 
 class LimitWatch {
@@ -58,7 +61,7 @@ private:
   Method *dense_ = nullptr;       // of this step, once prepared
   std::unique_ptr<Method> again_; // on the other system
   MethodKind kind_of_again_{};
-  Eigen::VectorXd z_;
+  VectorXd z_;
 };
 
 } // namespace ffrobot

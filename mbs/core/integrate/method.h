@@ -1,9 +1,10 @@
 // One-step methods, interchangeable: what the driver of an integration (integrate.h) needs of them.
 #pragma once
 
+#include "core/fields.h"
 #include "core/integrate/ode.h"
 
-#include <Eigen/Core>
+#include "core/eigen.h"
 
 #include <memory>
 
@@ -28,12 +29,12 @@ public:
   virtual bool finish(double t) = 0;
 
   // Error of the step of size h just made; needs last_slope().
-  virtual void estimate(double h, Eigen::VectorXd &error) = 0;
+  virtual void estimate(double h, VectorXd &error) = 0;
 
   // Slopes `x` off by as much at every stage, each by another amount, become the error that the estimate of such a step
   // sees, at most.
-  virtual void slopes_to_error(double h, Eigen::VectorXd &x) {
-    const Eigen::Index n = x.size() / 2;
+  virtual void slopes_to_error(double h, VectorXd &x) {
+    const Index n = x.size() / 2;
     x *= h * weight_of_rounding();
     x.head(n) += h * x.tail(n); // a coordinate, by its rate
   }
@@ -67,7 +68,7 @@ public:
 
   // Largest error of interpolate() within the step, once prepared; false where it is never much more than that of the
   // step's end.
-  virtual bool estimate_dense(Eigen::VectorXd &) const { return false; }
+  virtual bool estimate_dense(VectorXd &) const { return false; }
   virtual void interpolate(double t, double *y) const = 0;
 
   virtual double *end() = 0;
@@ -83,6 +84,8 @@ enum class MethodKind { dopri5, dop853, radau, generalized_alpha };
 struct MethodChoice {
   MethodKind kind = MethodKind::dop853;
   double spectral_radius = 0.8; // of generalized-alpha at infinite frequency
+
+  FFROBOT_FIELDS(kind, spectral_radius);
 };
 
 // The system must outlive the method.

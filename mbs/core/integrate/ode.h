@@ -3,7 +3,7 @@
 
 #include "core/space/local_coordinates.h"
 
-#include <Eigen/Core>
+#include "core/eigen.h"
 
 #include <complex>
 
@@ -25,8 +25,8 @@ public:
   explicit OdeSystem(const ConfigurationSpace &space) : local_(space) {}
   virtual ~OdeSystem() = default;
 
-  Eigen::Index n_v() const { return local_.space().n_v(); }
-  Eigen::Index size() const { return local_.size(); } // of z: 2 n_v
+  Index n_v() const { return local_.space().n_v(); }
+  Index size() const { return local_.size(); } // of z: 2 n_v
   LocalCoordinates &local() { return local_; }
   const LocalCoordinates &local() const { return local_; }
 
@@ -62,7 +62,7 @@ public:
   virtual bool is_sensible(const double *z) const = 0;
 
   // Functions of time alone that slopes follow, as many as prescribed(): loads, accelerations of paths.
-  virtual Eigen::Index prescribed() const = 0;
+  virtual Index prescribed() const = 0;
   virtual void prescribe(double t, double *f) = 0;
 
   // First step size to try: a tenth of the fastest vibration's radian.
@@ -70,11 +70,11 @@ public:
 
   virtual unsigned long evaluations() const = 0;
 
-  virtual Eigen::Index constraints() const = 0;         // rows of C, and of multipliers
-  virtual const Eigen::VectorXd &stiffness() const = 0; // (n_stiff), zero where nothing is stiff
-  virtual const Eigen::VectorXd &damping() const = 0;   // (n_stiff)
-  virtual const Eigen::MatrixXd &coupling() const = 0;  // (n_v, n_stiff - n_v)
-  Eigen::Index n_stiff() const { return n_v() + coupling().cols(); }
+  virtual Index constraints() const = 0;         // rows of C, and of multipliers
+  virtual const VectorXd &stiffness() const = 0; // (n_stiff), zero where nothing is stiff
+  virtual const VectorXd &damping() const = 0;   // (n_stiff)
+  virtual const MatrixXd &coupling() const = 0;  // (n_v, n_stiff - n_v)
+  Index n_stiff() const { return n_v() + coupling().cols(); }
 
   // M, C_q and D of the next factorisations are those at (t, z).
   virtual void linearise(double t, const double *z) = 0;
@@ -93,8 +93,8 @@ public:
   virtual void constraint_values(double t, const double *z, double *value, double *rate) = 0;
 
   // Largest of them (constraints) at z, relative to natural sizes: rounding leaves some 1e-15, in any units.
-  virtual double value_size(const double *z, const Eigen::VectorXd &value) const = 0;
-  virtual double rate_size(const double *z, const Eigen::VectorXd &rate) const = 0;
+  virtual double value_size(const double *z, const VectorXd &value) const = 0;
+  virtual double rate_size(const double *z, const VectorXd &rate) const = 0;
 
 private:
   LocalCoordinates local_;

@@ -6,11 +6,7 @@
 
 namespace ffrobot {
 
-using Eigen::Index;
-using Eigen::Matrix3d;
-using Eigen::RowVector3d;
-using Eigen::Vector3d;
-using VectorMap = Eigen::Map<const Eigen::VectorXd>;
+using VectorMap = Map<const VectorXd>;
 
 namespace {
 
@@ -48,14 +44,13 @@ constexpr double slow_contraction = 0.02; // geometry is taken anew when Newton'
 } // namespace
 
 Radau::Radau(OdeSystem &system)
-    : system_(system), project_(system), n_(system.n_v()), Z_(Eigen::MatrixXd::Zero(2 * n_, 3)), W_(Z_), F_(Z_),
-      change_(Z_), collocation_(Z_), slopes_(Z_), previous_slopes_(Z_), stage_(2 * n_), end_(2 * n_), start_(2 * n_),
-      first_slope_(2 * n_), last_slope_(2 * n_), real_(2 * n_), force_(system.n_stiff()), unknown_(n_),
-      complex_(2 * n_), complex_force_(system.n_stiff()), complex_unknown_(n_) {}
+    : ImplicitMethod(system), Z_(MatrixXd::Zero(2 * n_, 3)), W_(Z_), F_(Z_), change_(Z_), collocation_(Z_), slopes_(Z_),
+      previous_slopes_(Z_), stage_(2 * n_), real_(2 * n_), unknown_(n_), complex_(2 * n_),
+      complex_force_(system.n_stiff()), complex_unknown_(n_) {}
 
 // With b = r_v + mu r_q the equation (mu I - J) (dq, dv) = (r_q, r_v) is N dq + C_q^T nu = (M b + D r_q) / mu^2,
 // C_q dq = C_q b / mu^2, N = M + D / mu + K / mu^2; dq = b / mu^2 + x leaves forces on the modes alone.
-template <class Scalar> void Radau::solve(Scalar mu, Eigen::Matrix<Scalar, Eigen::Dynamic, 1> &x) {
+template <class Scalar> void Radau::solve(Scalar mu, Matrix<Scalar, Dynamic, 1> &x) {
   constexpr bool is_real = std::is_same_v<Scalar, double>;
   auto &force = [&]() -> auto & {
     if constexpr (is_real)
@@ -191,25 +186,18 @@ bool Radau::step(double t, const double *y, double h, double tolerance) {
 
 bool Radau::correct(double t) {
   real_ = end_;
-  if (project_(t, end_.data()))
+  if (project(t))
     return true;
   end_ = real_;
   stale_ = true; // Newton's method in the steps did well with a geometry that the projection finds too old
   factorise(t, end_.data(), factorised_step_);
-  return project_(t, end_.data());
-}
-
-bool Radau::finish(double t) {
-  if (!correct(t))
-    return false;
-  system_.slope(t, end_.data(), last_slope_.data());
-  return true;
+  return project(t);
 }
 
 // Order 5: the integral of the polynomial through the slopes at the stages, at the start and at two stages of the step
 // before, against the method's own. Without the last one they agree (five nodes, exact for degree 4 both), so the
 // difference is one of Newton's divided differences. (mu - h J)^-1 mu takes the stiff parts out, as for order 3.
-void Radau::estimate(double h, Eigen::VectorXd &error) {
+void Radau::estimate(double h, VectorXd &error) {
   slopes_.noalias() = Z_ * (A_inverse.transpose() / h);
   if (previous_step_ == 0) {
     error = first_slope_ + Z_ * (error_weights / h);
@@ -239,7 +227,7 @@ void Radau::estimate(double h, Eigen::VectorXd &error) {
   solve(mu_real / h, error);
 }
 
-void Radau::slopes_to_error(double h, Eigen::VectorXd &x) {
+void Radau::slopes_to_error(double h, VectorXd &x) {
   x *= 2 * weight_;
   solve(mu_real / h, x);
 }
@@ -252,14 +240,12 @@ void Radau::accept(double h) {
 
 void Radau::prepare_dense(double t, const double *y, double h) {
   collocation_.noalias() = Z_ * polynomial;
-  start_ = VectorMap(y, 2 * n_);
-  t0_ = t;
-  h_ = h;
+  ImplicitMethod::prepare_dense(t, y, h);
 }
 
 void Radau::interpolate(double t, double *y) const {
   const double x = (t - t0_) / h_;
-  Eigen::Map<Eigen::VectorXd>(y, 2 * n_) = start_ + collocation_ * Vector3d(x, x * x, x * x * x);
+  Map<VectorXd>(y, 2 * n_) = start_ + collocation_ * Vector3d(x, x * x, x * x * x);
 }
 
 } // namespace ffrobot

@@ -4,9 +4,6 @@
 
 namespace ffrobot {
 
-using Eigen::Index;
-using Eigen::VectorXd;
-
 RecordedMotion::RecordedMotion(OdeSystem &motion, const Recording &recording)
     : motion_(motion), recording_(recording), z_(motion_.size()), slope_(motion_.size()), end_slope_(motion_.size()) {
   constexpr int remembered = 4;
@@ -63,7 +60,7 @@ void RecordedMotion::make_again(Step &step) {
 
 // Hermite's cubic through the recorded ends and their slopes, where the step cannot be made again.
 void RecordedMotion::between_ends(const Step &step, double t) {
-  using Values = Eigen::Map<const VectorXd>;
+  using Values = Map<const VectorXd>;
   Method &method = *step.method;
   const Index n = z_.size();
   const double x = (t - step.begin) / step.length, left = 1 - x;

@@ -34,7 +34,7 @@ private:
     MethodKind kind = MethodKind::dop853;
     std::unique_ptr<Method> method;
     double begin = 0, length = 0;
-    Eigen::VectorXd start;
+    VectorXd start;
     bool is_made = true; // else iterations did not converge
   };
 
@@ -57,7 +57,7 @@ private:
   int next_stage_ = 0, stages_ = 0;
   bool is_at_stage_ = false;
   std::size_t end_ = static_cast<std::size_t>(-1); // of a step, of which the slope is known
-  Eigen::VectorXd z_, slope_, end_slope_;
+  VectorXd z_, slope_, end_slope_;
 };
 
 } // namespace ffrobot

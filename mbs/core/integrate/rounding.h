@@ -28,15 +28,15 @@ public:
   // near the end of the step. Sections with next to no inertia, as tips of beams and rods about their axes, amplify the
   // rounding of all sums: there slopes scatter however little states differ. Takes two slopes; none for some calls,
   // `without_look`, after one that found next to nothing. Valid until the next call.
-  const Eigen::VectorXd &error(double t, const double *z, const double *z_dot, double step, Method &method,
-                               const Eigen::VectorXd &error, int &without_look) {
-    using VectorMap = Eigen::Map<const Eigen::VectorXd>;
+  const VectorXd &error(double t, const double *z, const double *z_dot, double step, Method &method,
+                        const VectorXd &error, int &without_look) {
+    using VectorMap = Map<const VectorXd>;
     left_.setZero();
     if (without_look > 0) {
       --without_look;
       return left_;
     }
-    const Eigen::Index n = system_.size();
+    const Index n = system_.size();
     double largest = 0;
     const auto take_larger = [&] {
       method.slopes_to_error(step, found_);
@@ -68,8 +68,8 @@ private:
   static constexpr double many = 100; // roundings that entries are shifted by at most: so many that no two are equal
 
   OdeSystem &system_;
-  Eigen::ArrayXd shift_; // (n) of a state's entries, in roundings
-  Eigen::VectorXd shifted_, left_, found_;
+  ArrayXd shift_; // (n) of a state's entries, in roundings
+  VectorXd shifted_, left_, found_;
 };
 
 } // namespace ffrobot

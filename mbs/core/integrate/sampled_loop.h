@@ -12,8 +12,8 @@ struct Sampling {
   std::vector<double> times; // s, of samples
   double delay = 0;          // s, from a sample to when its command acts
   // Command at sample k: time and state (q, v), under the command that acts; never asked about time beyond the run
-  std::function<Eigen::VectorXd(std::size_t, double, const double *)> controller;
-  std::function<void(const Eigen::VectorXd &)> hold; // a command, from now on
+  std::function<VectorXd(std::size_t, double, const double *)> controller;
+  std::function<void(const VectorXd &)> hold; // a command, from now on
 };
 
 // Samples, and the actions of their commands, in order, of a run until `end` (s); what lies closer together than a
@@ -41,8 +41,8 @@ inline Breaks sampled_breaks(const Sampling &sampling, double end) {
       act_until(times[k], k + 1);
   }
   act_until(end, times.size());
-  breaks.at = [&sampling, events, commands = std::vector<Eigen::VectorXd>(times.size())](std::size_t i, double t,
-                                                                                         const double *y) mutable {
+  breaks.at = [&sampling, events, commands = std::vector<VectorXd>(times.size())](std::size_t i, double t,
+                                                                                  const double *y) mutable {
     if (const auto &[sample, acts] = events[i]; acts)
       sampling.hold(commands[sample]);
     else

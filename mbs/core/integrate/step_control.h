@@ -2,6 +2,8 @@
 // controller rejects every third step where fast vibration makes the error scatter.
 #pragma once
 
+#include "core/integrate/error_allowance.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -17,15 +19,14 @@ public:
   explicit StepControl(double order) : order_(order) {}
 
   // Size of the next step; error relative to the largest one allowed.
-  double after_accepted(double step, double error) {
+  double after_accepted(double step, double error, StepHistory &steps) const {
     constexpr double b = 8;
     error = std::max(error, 1e-12);
-    const double before = previous_step_ > 0 ? previous_error_ : error;
-    double factor = std::pow(square(target) / (error * before), 1 / (b * order_));
-    if (previous_step_ > 0)
-      factor *= std::sqrt(std::sqrt(std::sqrt(previous_step_ / step))); // to the power of 1/b
-    previous_step_ = step;
-    previous_error_ = error;
+    const double before = steps.previous_step > 0 ? steps.previous_error : error;
+    double factor = std::pow(target * target / (error * before), 1 / (b * order_));
+    if (steps.previous_step > 0)
+      factor *= std::sqrt(std::sqrt(std::sqrt(steps.previous_step / step))); // to the power of 1/b
+    steps.previous_step = step, steps.previous_error = error;
     return step * (1 + std::atan(factor - 1));
   }
 
@@ -36,19 +37,8 @@ public:
     return step * std::clamp(std::pow(target / error, 1 / order_), smallest_factor, largest_factor);
   }
 
-  // The last accepted step, with which a run goes on.
-  double previous_step() const { return previous_step_; }
-  double previous_error() const { return previous_error_; }
-  void go_on(double previous_step, double previous_error) {
-    previous_step_ = previous_step;
-    previous_error_ = previous_error;
-  }
-
 private:
-  static double square(double x) { return x * x; }
-
   double order_;
-  double previous_step_ = 0, previous_error_ = 1;
 };
 
 } // namespace ffrobot

@@ -26,14 +26,14 @@ public:
     if (system.prescribed() == 0)
       return;
     Eigen::ArrayXXd f(system.prescribed(), intervals + 1); // NaN where they have no finite value
-    for (Eigen::Index i = 0; i <= intervals; ++i)
+    for (Index i = 0; i <= intervals; ++i)
       system.prescribe(start + interval_ * static_cast<double>(i), f.col(i).data());
-    Eigen::ArrayXd bend = Eigen::ArrayXd::Zero(intervals + 1); // most of all functions
-    for (Eigen::Index k = 0; k < f.rows(); ++k) {
+    ArrayXd bend = ArrayXd::Zero(intervals + 1); // most of all functions
+    for (Index k = 0; k < f.rows(); ++k) {
       const double whole = range(f.row(k), tolerance);
       if (!(whole > 0) || !std::isfinite(whole))
         continue;
-      for (Eigen::Index i = 1; i < intervals; ++i) {
+      for (Index i = 1; i < intervals; ++i) {
         const double of_sample = std::abs(f(k, i - 1) - 2 * f(k, i) + f(k, i + 1)) / whole / interval_;
         if (of_sample > bend[i]) // not NaN
           bend[i] = of_sample;
@@ -63,7 +63,7 @@ public:
   }
 
 private:
-  static constexpr Eigen::Index intervals = 1000;
+  static constexpr Index intervals = 1000;
   static constexpr double most_bend = 4; // of a step
 
   // Range of the values that are numbers; 0 where it is less than `tolerance` of the largest.

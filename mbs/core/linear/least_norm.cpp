@@ -4,9 +4,6 @@
 
 namespace ffrobot {
 
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 namespace {
 
 constexpr double dependent = 1e-10; // of the largest pivot: rounding leaves 1e-15 of dependent equations

@@ -8,18 +8,18 @@ namespace ffrobot {
 
 class LeastNorm {
 public:
-  void compute(const Eigen::MatrixXd &A, bool may_be_singular = false); // a square one
-  Eigen::VectorXd solve(const Eigen::VectorXd &b) const;
-  Eigen::MatrixXd solve(const Eigen::MatrixXd &b) const; // column by column
-  Eigen::VectorXd solve_transposed(const Eigen::VectorXd &c) const;
+  void compute(const MatrixXd &A, bool may_be_singular = false); // a square one
+  VectorXd solve(const VectorXd &b) const;
+  MatrixXd solve(const MatrixXd &b) const; // column by column
+  VectorXd solve_transposed(const VectorXd &c) const;
 
 private:
   bool is_square_ = true;
-  Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
-  Eigen::MatrixXd pseudo_inverse_; // where A is not square
+  Eigen::PartialPivLU<MatrixXd> lu_;
+  MatrixXd pseudo_inverse_; // where A is not square
 };
 
 // Of a square matrix
-double determinant(const Eigen::MatrixXd &A);
+double determinant(const MatrixXd &A);
 
 } // namespace ffrobot

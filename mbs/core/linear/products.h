@@ -2,16 +2,15 @@
 // again for every kind of operand (half the time of a file that has ten).
 #pragma once
 
-#include <Eigen/Core>
+#include "core/eigen.h"
 
 namespace ffrobot {
 
-using ConstMatrix = Eigen::Ref<const Eigen::MatrixXd>;
+using ConstMatrix = Ref<const MatrixXd>;
 
-Eigen::MatrixXd matrix_product(const ConstMatrix &A, const ConstMatrix &B); // A B
+MatrixXd matrix_product(const ConstMatrix &A, const ConstMatrix &B); // A B
 
 // To `to`: factor A^T B
-void add_transposed_product(const ConstMatrix &A, const ConstMatrix &B, Eigen::Ref<Eigen::MatrixXd> to,
-                            double factor = 1);
+void add_transposed_product(const ConstMatrix &A, const ConstMatrix &B, Ref<MatrixXd> to, double factor = 1);
 
 } // namespace ffrobot

@@ -6,9 +6,6 @@
 
 namespace ffrobot {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-
 RightVectors::RightVectors(const MatrixXd &A) : V(MatrixXd::Identity(A.cols(), A.cols())) {
   if (A.size() == 0)
     return;

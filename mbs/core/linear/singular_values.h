@@ -1,22 +1,22 @@
 // Singular values of dense matrices, and what a matrix takes to zero.
 #pragma once
 
-#include <Eigen/Core>
+#include "core/eigen.h"
 
 namespace ffrobot {
 
 // Singular values of A, descending, none without rows or columns, and its right singular vectors, square.
 struct RightVectors {
-  explicit RightVectors(const Eigen::MatrixXd &A);
+  explicit RightVectors(const MatrixXd &A);
 
   // How many values are above `dependent` times the largest, which counts as 1 at least
-  Eigen::Index rank(double dependent) const;
+  Index rank(double dependent) const;
   // Orthonormal columns that A takes to zero if its rank is that
-  Eigen::MatrixXd null_space(Eigen::Index rank) const { return V.rightCols(V.cols() - rank); }
-  double ratio(Eigen::Index rank) const; // of value no. `rank` to the first; 1 of rank 0
+  MatrixXd null_space(Index rank) const { return V.rightCols(V.cols() - rank); }
+  double ratio(Index rank) const; // of value no. `rank` to the first; 1 of rank 0
 
-  Eigen::VectorXd values;
-  Eigen::MatrixXd V;
+  VectorXd values;
+  MatrixXd V;
 };
 
 } // namespace ffrobot

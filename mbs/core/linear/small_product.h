@@ -3,12 +3,12 @@
 
 #include "core/recursion/numbers/pack.h"
 
-#include <Eigen/Core>
+#include "core/eigen.h"
 
 namespace ffrobot {
 
 // y (rows) = A x
-inline void multiply_small(const Eigen::MatrixXd &A, const double *x, double *y) {
+inline void multiply_small(const MatrixXd &A, const double *x, double *y) {
   const long rows = A.rows(), columns = A.cols();
   recursion::in_registers(rows, [&]<int w>(long i) {
     using Part = recursion::Pack<double, w>;

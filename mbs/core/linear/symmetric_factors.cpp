@@ -4,10 +4,6 @@
 
 namespace ffrobot {
 
-using Eigen::Dynamic;
-using Eigen::Index;
-using Eigen::Matrix;
-
 namespace {
 
 // Loses x a (n). Eigen's expression takes longer where n is small.
@@ -47,9 +43,9 @@ void solve_symmetric(const Matrix<Scalar, Dynamic, Dynamic> &factors, Matrix<Sca
     x[j] = x[j] * factors(j, j) - factors.col(j).tail(n - j - 1).cwiseProduct(x.tail(n - j - 1)).sum();
 }
 
-template void factorise_symmetric(Eigen::MatrixXd &);
+template void factorise_symmetric(MatrixXd &);
 template void factorise_symmetric(Eigen::MatrixXcd &);
-template void solve_symmetric(const Eigen::MatrixXd &, Eigen::VectorXd &);
-template void solve_symmetric(const Eigen::MatrixXcd &, Eigen::VectorXcd &);
+template void solve_symmetric(const MatrixXd &, VectorXd &);
+template void solve_symmetric(const Eigen::MatrixXcd &, VectorXcd &);
 
 } // namespace ffrobot

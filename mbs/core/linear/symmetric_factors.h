@@ -2,16 +2,15 @@
 // recursion/numbers/multipliers.h has the few multipliers of one evaluation, of any kind of numbers.
 #pragma once
 
-#include <Eigen/Core>
+#include "core/eigen.h"
 
 namespace ffrobot {
 
 // The lower half of A (n, n) becomes L and 1/D.
-template <class Scalar> void factorise_symmetric(Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> &A);
+template <class Scalar> void factorise_symmetric(Matrix<Scalar, Dynamic, Dynamic> &A);
 
 // x (n) in place, with these factors
 template <class Scalar>
-void solve_symmetric(const Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> &factors,
-                     Eigen::Matrix<Scalar, Eigen::Dynamic, 1> &x);
+void solve_symmetric(const Matrix<Scalar, Dynamic, Dynamic> &factors, Matrix<Scalar, Dynamic, 1> &x);
 
 } // namespace ffrobot

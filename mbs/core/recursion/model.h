@@ -2,9 +2,10 @@
 // units; modes are mass-orthonormal. Symbols: docs/theory.md; Shabana, Dynamics of Multibody Systems, ch. 5.
 #pragma once
 
+#include "core/fields.h"
 #include "core/recursion/joint/place.h"
 
-#include <Eigen/Core>
+#include "core/eigen.h"
 
 #include <array>
 #include <string>
@@ -14,57 +15,66 @@ namespace ffrobot::recursion {
 
 // A section of a body: where joints, constraints and forces attach. Its rows of Phi are displacements, then rotations.
 struct PlanarMarker {
-  Eigen::Vector2d position = Eigen::Vector2d::Zero();
-  double angle = 0;               // of its axes
-  Eigen::MatrixXd Phi;            // (3, n)
-  std::vector<Eigen::MatrixXd> K; // three (n, n): it moves and turns by -1/2 p^T K p besides; empty: it does not
+  Vector2d position = Vector2d::Zero();
+  double angle = 0;        // of its axes
+  MatrixXd Phi;            // (3, n)
+  std::vector<MatrixXd> K; // three (n, n): it moves and turns by -1/2 p^T K p besides; empty: it does not
+
+  FFROBOT_FIELDS(position, angle, Phi, K);
 };
 struct SpatialMarker {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d triad = Eigen::Matrix3d::Identity(); // columns: its axes
-  Eigen::MatrixXd Phi;                                 // (6, n)
-  std::vector<Eigen::MatrixXd> K; // six (n, n): it moves and turns by -1/2 p^T K p besides; empty: it does not
+  Vector3d position = Vector3d::Zero();
+  Matrix3d triad = Matrix3d::Identity(); // columns: its axes
+  MatrixXd Phi;                          // (6, n)
+  std::vector<MatrixXd> K;               // six (n, n): it moves and turns by -1/2 p^T K p besides; empty: it does not
   bool turns = false; // of the ground: its axes follow an orientation in time; constraint equations alone attach there
+
+  FFROBOT_FIELDS(position, triad, Phi, K, turns);
 };
 
 // Empty matrices are zero; an empty m_xy is the identity.
 struct PlanarData {
   double mass = 0, inertia = 0; // kg; kg m^2, about the origin
-  Eigen::Vector2d first_moment = Eigen::Vector2d::Zero();
-  Eigen::VectorXd stiffness;     // (n) 1/s^2
-  Eigen::MatrixXd damping;       // (n, 1) or (n, n) 1/s
-  Eigen::MatrixXd S_bar;         // (2, n)
-  Eigen::VectorXd h, j;          // (n) I_bar_12 - I_bar_21, I_bar_11 + I_bar_22
-  Eigen::MatrixXd S_tilde, m_xy; // (n, n) S_bar_12 - S_bar_21, S_bar_11 + S_bar_22
+  Vector2d first_moment = Vector2d::Zero();
+  VectorXd stiffness;     // (n) 1/s^2
+  MatrixXd damping;       // (n, 1) or (n, n) 1/s
+  MatrixXd S_bar;         // (2, n)
+  VectorXd h, j;          // (n) I_bar_12 - I_bar_21, I_bar_11 + I_bar_22
+  MatrixXd S_tilde, m_xy; // (n, n) S_bar_12 - S_bar_21, S_bar_11 + S_bar_22
   // Geometric stiffening, empty without: points move by -1/2 p^T G p besides. Integrals of G_x, G_y, x G_x + y G_y and
   // x G_y - y G_x dm, each (n, n) and symmetric.
-  std::vector<Eigen::MatrixXd> K;
+  std::vector<MatrixXd> K;
   std::vector<PlanarMarker> markers;
-  Eigen::Index modes() const { return stiffness.size(); }
+  Index modes() const { return stiffness.size(); }
   bool is_stiffened() const { return !K.empty(); }
+
+  FFROBOT_FIELDS(mass, inertia, first_moment, stiffness, damping, S_bar, h, j, S_tilde, m_xy, K, markers);
 };
 struct SpatialData {
   double mass = 0;
-  Eigen::Vector3d first_moment = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d J2 = Eigen::Matrix3d::Zero(); // kg m^2, integral of x x^T dm
-  Eigen::VectorXd stiffness;                    // (n) 1/s^2
-  Eigen::MatrixXd damping;                      // (n, 1) or (n, n) 1/s
-  Eigen::MatrixXd S_bar;                        // (3, n)
-  Eigen::MatrixXd I_bar;                        // (9, n), row 3 k + l: integral of x_k S_l dm
-  std::array<Eigen::MatrixXd, 9> S_bar_kl;      // (n, n), 3 k + l
+  Vector3d first_moment = Vector3d::Zero();
+  Matrix3d J2 = Matrix3d::Zero();   // kg m^2, integral of x x^T dm
+  VectorXd stiffness;               // (n) 1/s^2
+  MatrixXd damping;                 // (n, 1) or (n, n) 1/s
+  MatrixXd S_bar;                   // (3, n)
+  MatrixXd I_bar;                   // (9, n), row 3 k + l: integral of x_k S_l dm
+  std::array<MatrixXd, 9> S_bar_kl; // (n, n), 3 k + l
   // Geometric stiffening, empty without: points move by -1/2 p^T G p besides. Integrals of G_l dm (3) and, at 3 k + l,
   // of x_k G_l dm (9), each (n, n) and symmetric.
-  std::vector<Eigen::MatrixXd> K_s, K_x;
+  std::vector<MatrixXd> K_s, K_x;
   // Rotary inertia that a line of mass has not, of spin about `spin_axis`: J_s, h_s (n), S_s (n, n), with S_s booked in
   // S_bar_kl as motion along `spin_booked` (formulation of Euler-Bernoulli links).
   double J_spin = 0;
-  Eigen::VectorXd h_spin;
-  Eigen::MatrixXd S_spin;
-  Eigen::Vector3d spin_axis = Eigen::Vector3d::UnitX(), spin_booked = Eigen::Vector3d::UnitZ();
-  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity(); // columns: those of the modal file, where most blocks vanish
+  VectorXd h_spin;
+  MatrixXd S_spin;
+  Vector3d spin_axis = Vector3d::UnitX(), spin_booked = Vector3d::UnitZ();
+  Matrix3d axes = Matrix3d::Identity(); // columns: those of the modal file, where most blocks vanish
   std::vector<SpatialMarker> markers;
-  Eigen::Index modes() const { return stiffness.size(); }
+  Index modes() const { return stiffness.size(); }
   bool is_stiffened() const { return !K_s.empty(); }
+
+  FFROBOT_FIELDS(mass, first_moment, J2, stiffness, damping, S_bar, I_bar, S_bar_kl, K_s, K_x, J_spin, h_spin, S_spin,
+                 spin_axis, spin_booked, markers);
 };
 
 // The tree: body i is joined to marker `parent_marker` of a body before it, or of the ground (parent -1).
@@ -78,11 +88,16 @@ template <class Data> struct BodyModel {
   bool driven = false;      // forces or constraints act along the joint's coordinates
   bool of_section = false;  // these are the section's even where modes turn it and nothing acts along them
   Data data;
+
+  FFROBOT_FIELDS(name, parent, parent_marker, inboard_marker, joint, lead, rotor_inertia, gear_ratio, driven,
+                 of_section, data);
 };
 
 struct MarkerAt {
   int body = -1, marker = 0; // body -1: of the ground
   bool only_forces = false;  // of a wrench in the plane: its moment is zero at all times
+
+  FFROBOT_FIELDS(body, marker);
 };
 
 // Constraint equations between two markers: what is zero, or follows a target. In the plane axes have two components,
@@ -99,8 +114,10 @@ struct ConstraintModel {
   std::string name;
   ConstraintKind kind = ConstraintKind::point;
   MarkerAt a, b;
-  Eigen::Vector3d f = Eigen::Vector3d::UnitX(), g = Eigen::Vector3d::UnitX(); // n is f
+  Vector3d f = Vector3d::UnitX(), g = Vector3d::UnitX(); // n is f
   int coordinate = -1; // in v; of a rotation, turn or slide it is taken off, where there is one
+
+  FFROBOT_FIELDS(name, kind, a, b, f, g, coordinate);
 };
 
 } // namespace ffrobot::recursion

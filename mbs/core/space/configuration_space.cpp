@@ -4,9 +4,7 @@
 
 namespace ffrobot {
 
-using Eigen::Index;
 using Eigen::Quaterniond;
-using Eigen::Vector3d;
 
 namespace {
 
@@ -36,10 +34,10 @@ void ConfigurationSpace::integrate(const double *q, double h, const double *v, d
     for (Index i = 0; i < of.count; ++i)
       out[of.q + i] = q[of.q + i] + h * v[of.v + i];
   for (const Rotation &of : rotations_) {
-    const Vector3d turn = h * Eigen::Map<const Vector3d>(v + of.v);
+    const Vector3d turn = h * Map<const Vector3d>(v + of.v);
     const Quaterniond e = (quaternion(q + of.q) * rotation_of(turn)).normalized(); // rounding does not add up
     out[of.q] = e.w();
-    Eigen::Map<Vector3d>(out + of.q + 1) = e.vec();
+    Map<Vector3d>(out + of.q + 1) = e.vec();
   }
 }
 
@@ -48,7 +46,7 @@ void ConfigurationSpace::difference(const double *q1, const double *q0, double *
     for (Index i = 0; i < of.count; ++i)
       dq[of.v + i] = q1[of.q + i] - q0[of.q + i];
   for (const Rotation &of : rotations_)
-    Eigen::Map<Vector3d>(dq + of.v) = rotation_vector(quaternion(q0 + of.q).conjugate() * quaternion(q1 + of.q));
+    Map<Vector3d>(dq + of.v) = rotation_vector(quaternion(q0 + of.q).conjugate() * quaternion(q1 + of.q));
 }
 
 } // namespace ffrobot

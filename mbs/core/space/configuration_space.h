@@ -1,7 +1,7 @@
 // The space of the coordinates q of a system: numbers, and orientations as unit quaternions.
 #pragma once
 
-#include <Eigen/Core>
+#include "core/eigen.h"
 
 #include <vector>
 
@@ -14,10 +14,10 @@ class ConfigurationSpace {
 public:
   ConfigurationSpace() = default;
   // rotations: index in v of the first of the three components of each, ascending
-  explicit ConfigurationSpace(Eigen::Index n_v, const std::vector<Eigen::Index> &rotations = {});
+  explicit ConfigurationSpace(Index n_v, const std::vector<Index> &rotations = {});
 
-  Eigen::Index n_q() const { return n_v_ + rotations_.size(); }
-  Eigen::Index n_v() const { return n_v_; }
+  Index n_q() const { return n_v_ + rotations_.size(); }
+  Index n_v() const { return n_v_; }
   bool is_flat() const { return rotations_.empty(); } // numbers alone: n_q = n_v, increments are differences
 
   // out (n_q) = q (+) h v: where moving with v for a time h leads; h = 1 for an increment. `out` may be `q`.
@@ -27,16 +27,16 @@ public:
   void difference(const double *q1, const double *q0, double *dq) const;
 
   struct Rotation {
-    Eigen::Index q, v; // its first components
+    Index q, v; // its first components
   };
   struct Numbers {
-    Eigen::Index q, v, count;
+    Index q, v, count;
   };
   const std::vector<Rotation> &rotations() const { return rotations_; }
   const std::vector<Numbers> &numbers() const { return numbers_; } // between the rotations
 
 private:
-  Eigen::Index n_v_ = 0;
+  Index n_v_ = 0;
   std::vector<Rotation> rotations_;
   std::vector<Numbers> numbers_;
 };

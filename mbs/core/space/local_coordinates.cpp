@@ -7,10 +7,6 @@
 
 namespace ffrobot {
 
-using Eigen::Index;
-using Eigen::Vector3d;
-using Eigen::VectorXd;
-
 LocalCoordinates::LocalCoordinates(const ConfigurationSpace &space) : space_(space) {
   if (!space_.is_flat()) {
     centre_ = VectorXd::Zero(space_.n_q());
@@ -22,7 +18,7 @@ void LocalCoordinates::set_centre(const double *y) {
   if (space_.is_flat())
     return;
   for (const auto &of : space_.rotations())
-    centre_.segment<4>(of.q) = Eigen::Map<const Eigen::Vector4d>(y + of.q);
+    centre_.segment<4>(of.q) = Map<const Eigen::Vector4d>(y + of.q);
 }
 
 const double *LocalCoordinates::curved_state(const double *z) const {
@@ -42,7 +38,7 @@ void LocalCoordinates::from_state(const double *y, double *z) const {
 
 bool LocalCoordinates::is_within_half_turns(const double *z) const {
   for (const auto &of : space_.rotations())
-    if (!(Eigen::Map<const Vector3d>(z + of.v).norm() < std::numbers::pi))
+    if (!(Map<const Vector3d>(z + of.v).norm() < std::numbers::pi))
       return false;
   return true;
 }
@@ -50,7 +46,7 @@ bool LocalCoordinates::is_within_half_turns(const double *z) const {
 double LocalCoordinates::fastest_rotation(const double *v) const {
   double fastest = 0;
   for (const auto &of : space_.rotations())
-    fastest = std::max(fastest, Eigen::Map<const Vector3d>(v + of.v).norm());
+    fastest = std::max(fastest, Map<const Vector3d>(v + of.v).norm());
   return fastest;
 }
 
@@ -65,8 +61,7 @@ void LocalCoordinates::shift(double *z, double h, const double *dq) const {
 void LocalCoordinates::rates_of_rotations(const double *z, double *z_dot) const {
   const double *v = z + space_.n_v();
   for (const auto &of : space_.rotations())
-    Eigen::Map<Vector3d>(z_dot + of.v) =
-        rotation_vector_rate(Eigen::Map<const Vector3d>(z + of.v), Eigen::Map<const Vector3d>(v + of.v));
+    Map<Vector3d>(z_dot + of.v) = rotation_vector_rate(Map<const Vector3d>(z + of.v), Map<const Vector3d>(v + of.v));
 }
 
 bool LocalCoordinates::recentre(double *z, double *z_dot) {
@@ -74,7 +69,7 @@ bool LocalCoordinates::recentre(double *z, double *z_dot) {
     return false;
   set_centre(curved_state(z));
   for (const auto &of : space_.rotations())
-    Eigen::Map<Vector3d>(z + of.v).setZero();
+    Map<Vector3d>(z + of.v).setZero();
   rate(z, z_dot);
   return true;
 }

@@ -18,8 +18,8 @@ public:
   explicit LocalCoordinates(const ConfigurationSpace &space);
 
   const ConfigurationSpace &space() const { return space_; }
-  Eigen::Index state_size() const { return space_.n_q() + space_.n_v(); } // of y
-  Eigen::Index size() const { return 2 * space_.n_v(); }                  // of z
+  Index state_size() const { return space_.n_q() + space_.n_v(); } // of y
+  Index size() const { return 2 * space_.n_v(); }                  // of z
 
   void set_centre(const double *y);
 
@@ -51,8 +51,8 @@ private:
   void rates_of_rotations(const double *z, double *z_dot) const;
 
   ConfigurationSpace space_;
-  Eigen::VectorXd centre_;        // q, with zeros for its numbers; empty where the space is flat
-  mutable Eigen::VectorXd state_; // y
+  VectorXd centre_;        // q, with zeros for its numbers; empty where the space is flat
+  mutable VectorXd state_; // y
 };
 
 } // namespace ffrobot

@@ -8,15 +8,15 @@
 namespace ffrobot {
 
 // exp(x): the rotation by |x| about x
-inline Eigen::Quaterniond rotation_of(const Eigen::Vector3d &x) {
+inline Eigen::Quaterniond rotation_of(const Vector3d &x) {
   const double angle = x.norm();
   const double half_sinc = angle < 1e-4 ? 0.5 - angle * angle / 48 : std::sin(0.5 * angle) / angle;
-  const Eigen::Vector3d axis = half_sinc * x;
+  const Vector3d axis = half_sinc * x;
   return {std::cos(0.5 * angle), axis.x(), axis.y(), axis.z()};
 }
 
 // log(e): the shortest rotation vector, |x| <= pi
-inline Eigen::Vector3d rotation_vector(const Eigen::Quaterniond &e) {
+inline Vector3d rotation_vector(const Eigen::Quaterniond &e) {
   const double sine = e.vec().norm();
   if (sine < 1e-8)
     return 2 / e.w() * e.vec();
@@ -26,7 +26,7 @@ inline Eigen::Vector3d rotation_vector(const Eigen::Quaterniond &e) {
 
 // x_dot of the rotation vector x of a body that turns with the angular velocity omega, in body axes: the inverse of the
 // right Jacobian of exp. H. Munthe-Kaas, BIT 38 (1998); A. Iserles et al., Acta Numerica 9 (2000), sec. B.
-inline Eigen::Vector3d rotation_vector_rate(const Eigen::Vector3d &x, const Eigen::Vector3d &omega) {
+inline Vector3d rotation_vector_rate(const Vector3d &x, const Vector3d &omega) {
   const double angle = x.norm();
   const double factor =
       angle < 1e-2 ? 1. / 12 + angle * angle / 720 : (1 - 0.5 * angle / std::tan(0.5 * angle)) / (angle * angle);

@@ -38,7 +38,7 @@ inline void accelerate_joint(const Node<Space> &node, const T *q, Hinge<Space, T
                              const Pack<T, W> &y, T *A, T *a) {
   constexpr int d = Space::dim;
   T x[6];
-  acceleration_to_freedoms(node, hinge, A);
+  acceleration_by_freedoms<1>(node, hinge, A);
   if (node.is_single_grounded) {
     const auto by_section = symmetric_product<d, T>(hinge.Lambda, A);
     for (int i = 0; i < d; ++i)
@@ -61,13 +61,13 @@ inline void accelerate_joint(const Node<Space> &node, const T *q, Hinge<Space, T
     x[k] = node.rotor_inertia == 0 ? found - before : found;
     A[f] = node.rotor_inertia == 0 ? found : before + found;
   }
-  acceleration_from_freedoms(node, hinge, A);
+  acceleration_by_freedoms<-1>(node, hinge, A);
   if (node.shape.in_inner_axes) {
     const int linear = node.joint == JointKind::free ? Space::linear : 2;
     T u[6] = {x[0], x[1], T(0.), T(0.), T(0.), T(0.)}, turned[6];
     if (linear == 3)
       u[2] = x[2];
-    to_inner_axes(node, q, u, turned);
+    change_section<true>(node, q, u, turned);
     for (int k = 0; k < linear; ++k)
       x[k] = turned[k];
   }
@@ -81,8 +81,8 @@ inline void accelerate_joint(const Node<Space> &node, const T *q, Hinge<Space, T
 // Accelerations of ports, and forces f on those that modes move or that carry a joint, whose forces steps are judged
 // by; the last eliminated first.
 template <class Space, class T, int W>
-inline void accelerate_ports(const Mechanism<Space> &m, const Node<Space> &node, bool by_multipliers,
-                             Workspace<Space, T> &w, const Pack<T, W> &y, const T *A) {
+inline void accelerate_ports(const Node<Space> &node, bool by_multipliers, Workspace<Space, T> &w, const Pack<T, W> &y,
+                             const T *A) {
   constexpr int d = Space::dim, stride = stride_of(W);
   const int n = node.ports();
   for (int k = node.outboard - 1; k >= 0; --k) {
@@ -100,7 +100,7 @@ inline void accelerate_ports(const Mechanism<Space> &m, const Node<Space> &node,
             X_A[i] += Kf[i];
         }
     auto moved = Pack<T, d>::zero(), held = moved;
-    const bool is_flexible = node.body.ports[k].is_flexible, loaded = m.children[node.first_port + k] >= 0;
+    const bool is_flexible = node.body.ports[k].is_flexible, loaded = w.m.children[node.first_port + k] >= 0;
     if (loaded)
       held = symmetric_product<d, T>(port.Y, X_A);
     if (is_flexible || loaded) {
@@ -122,8 +122,8 @@ inline void accelerate_ports(const Mechanism<Space> &m, const Node<Space> &node,
 }
 
 template <class Space, class T, int W>
-inline void accelerate_body(const Mechanism<Space> &m, const Node<Space> &node, const T *q, bool by_multipliers,
-                            Workspace<Space, T> &w, const Pack<T, W> &y, T *a) {
+inline void accelerate_body(const Node<Space> &node, const T *q, bool by_multipliers, Workspace<Space, T> &w,
+                            const Pack<T, W> &y, T *a) {
   constexpr int d = Space::dim;
   const int i_node = node.index;
   Hinge<Space, T> &hinge = w.hinges[i_node];
@@ -131,7 +131,7 @@ inline void accelerate_body(const Mechanism<Space> &m, const Node<Space> &node, 
   T *A = hinge.A;
   if (node.parent < 0) {
     T ground[d];
-    ground_acceleration(m, node.parent_port, ground);
+    ground_acceleration(w.m, node.parent_port, ground);
     for (T &x : ground)
       x = by_multipliers ? T(0.) : x;
     hinge.turn.back(ground, A);
@@ -165,7 +165,7 @@ inline void accelerate_body(const Mechanism<Space> &m, const Node<Space> &node, 
   }
   for (int i = 0; i < d; ++i)
     state.A[i] = A_frame[i];
-  accelerate_ports<Space, T, W>(m, node, by_multipliers, w, y, A_frame);
+  accelerate_ports<Space, T, W>(node, by_multipliers, w, y, A_frame);
   if (node.body.n == 0)
     return;
   for (int i = 0; i < d; ++i)

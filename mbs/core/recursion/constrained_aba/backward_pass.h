@@ -28,8 +28,8 @@ namespace ffrobot::recursion {
 
 // M and H in axes of the port of the parent, with what velocities do at the joint: pi = H + M c.
 template <class Space, class T, int W>
-inline void propagate_to_parent(const Mechanism<Space> &m, const Node<Space> &node, Workspace<Space, T> &w,
-                                const Pack<T, Space::dim> *M, Pack<T, W> *H, Pack<T, W> &gamma) {
+inline void propagate_to_parent(const Node<Space> &node, Workspace<Space, T> &w, const Pack<T, Space::dim> *M,
+                                Pack<T, W> *H, Pack<T, W> &gamma) {
   constexpr int d = Space::dim, stride = stride_of(W);
   using Cols = Pack<T, W>;
   const Hinge<Space, T> &hinge = w.hinges[node.index];
@@ -50,13 +50,13 @@ inline void propagate_to_parent(const Mechanism<Space> &m, const Node<Space> &no
   hinge.turn.apply(H, P);
   if (node.parent < 0) {
     T A[d];
-    ground_acceleration(m, node.parent_port, A);
+    ground_acceleration(w.m, node.parent_port, A);
     for (int i = 0; i < d; ++i)
       gamma += A[i] * P[i];
     return;
   }
   T *to = w.force.data() + node.parent_port * d * stride;
-  if (m.cleared[node.parent_port])
+  if (w.m.cleared[node.parent_port])
     for (int i = 0; i < d; ++i)
       P[i] += Cols::read(to + i * stride);
   for (int i = 0; i < d; ++i)
@@ -65,8 +65,8 @@ inline void propagate_to_parent(const Mechanism<Space> &m, const Node<Space> &no
 
 // A body after its children: its ports, its modes, its joint.
 template <class Space, class T, int W>
-inline void eliminate_body(const Mechanism<Space> &m, const Node<Space> &node, const T *q, const T *v,
-                           const Forces<T> &forces, Workspace<Space, T> &w, Delassus<T, W> &S, Pack<T, W> &gamma) {
+inline void eliminate_body(const Node<Space> &node, const T *q, const T *v, const Forces<T> &forces,
+                           Workspace<Space, T> &w, Delassus<T, W> &S, Pack<T, W> &gamma) {
   constexpr int d = Space::dim;
   using Cols = Pack<T, W>;
   // M becomes Lambda, where that is in axes of the section
@@ -78,12 +78,12 @@ inline void eliminate_body(const Mechanism<Space> &m, const Node<Space> &node, c
   for (int i = 0; i < d; ++i)
     H[i] = Cols::zero(), H[i].set(0, b[i]);
   if (node.ports())
-    eliminate_ports<Space, T, W>(m, node, w, M, H, S, gamma);
+    eliminate_ports<Space, T, W>(node, w, M, H, S, gamma);
   if (node.inboard >= 0)
     move_to_section<Space, T, W>(node, w, M, H, S);
-  eliminate_joint<Space, T, W>(m, node, q + node.q, forces.generalized ? forces.generalized + node.v : nullptr, w, M, H,
+  eliminate_joint<Space, T, W>(node, q + node.q, forces.generalized ? forces.generalized + node.v : nullptr, w, M, H,
                                S);
-  propagate_to_parent<Space, T, W>(m, node, w, M, H, gamma);
+  propagate_to_parent<Space, T, W>(node, w, M, H, gamma);
 }
 
 } // namespace ffrobot::recursion

@@ -55,16 +55,16 @@ template <class Space, class T> void add_up(Workspace<Space, T> &w, const T &uni
 }
 
 template <bool by_multipliers, class Space, class T>
-void accelerate_in_blocks(const Mechanism<Space> &m, const T *q, Workspace<Space, T> &w, T *a) {
+void accelerate_in_blocks(const T *q, Workspace<Space, T> &w, T *a) {
   add_up(w, by_multipliers ? w.y[0] : T(1.));
   auto y = Pack<T, most_columns>::zero();
   y.set(0, T(1.));
-  acceleration_pass_of_block<by_multipliers>(m, q, y, w, a);
+  acceleration_pass_of_block<by_multipliers>(q, y, w, a);
 }
 
 template <class Space, class T>
-void evaluate_in_blocks(const Mechanism<Space> &m, const T *q, const T *v, const Forces<T> &forces, bool is_placed,
-                        const T *target, Workspace<Space, T> &w, T *a) {
+void evaluate_in_blocks(const T *q, const T *v, const Forces<T> &forces, bool is_placed, const T *target,
+                        Workspace<Space, T> &w, T *a) {
   const int n = static_cast<int>(w.active.size());
   T *S_all = w.factor.data(), *lambda = w.y.data() + 1;
   Delassus<T, most_columns> S;
@@ -75,8 +75,8 @@ void evaluate_in_blocks(const Mechanism<Space> &m, const T *q, const T *v, const
     S.terms = &block.terms;
     exchange_constraints(w, block);
     if (!is_placed || first > 0) // the backward pass leaves kinematics of some bodies changed
-      kinematic_pass(m, q, v, forces, w);
-    backward_pass_of_block(m, q, v, forces, w, S, gamma);
+      kinematic_pass(q, v, forces, w);
+    backward_pass_of_block(q, v, forces, w, S, gamma);
     const int count = static_cast<int>(w.active.size());
     for (int r = 0; r < count; ++r) {
       lambda[first + r] = gamma[r + 1] - S[r + 1][0] - (target[w.active[r]] - w.lift[r]);
@@ -97,7 +97,7 @@ void evaluate_in_blocks(const Mechanism<Space> &m, const T *q, const T *v, const
   for (int r = 0; r < n; ++r)
     w.lambda[w.active[r]] = lambda[r];
   w.target = target;
-  accelerate_in_blocks<false>(m, q, w, a);
+  accelerate_in_blocks<false>(q, w, a);
   ++w.evaluations;
 }
 

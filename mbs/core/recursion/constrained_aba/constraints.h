@@ -8,10 +8,9 @@ namespace ffrobot::recursion {
 
 // What a moment does with the angular acceleration of a marker whose orientation is prescribed
 template <class Space, class T>
-FFROBOT_INLINE T by_turning(const Mechanism<Space> &m, const Attachment &at, const Workspace<Space, T> &w,
-                            const T *moment) {
+FFROBOT_INLINE T by_turning(const Attachment &at, const Workspace<Space, T> &w, const T *moment) {
   if constexpr (Space::dim == 6)
-    if (at.node < 0 && m.ground[at.port].turns)
+    if (at.node < 0 && w.m.ground[at.port].turns)
       return dot(w.turning[at.port].alpha.data(), moment);
   return T(0.);
 }
@@ -88,8 +87,8 @@ FFROBOT_INLINE void dot_motion(const T *n, const T *g_local, const Pose<T> &a, c
 
 // With positions; `n` alone matters where directions do not move and neither value nor rate is asked for.
 template <class Space, class T>
-FFROBOT_NOINLINE void constraint_motion(const Mechanism<Space> &m, const Constraint &constraint,
-                                        const Workspace<Space, T> &w, bool located, ConstraintMotion<T> &to) {
+FFROBOT_NOINLINE void constraint_motion(const Constraint &constraint, const Workspace<Space, T> &w, bool located,
+                                        ConstraintMotion<T> &to) {
   to.value = to.rate = to.bias = T(0.);
   for (int i = 0; i < 3; ++i)
     to.force[i] = to.moment_a[i] = to.moment_b[i] = T(0.);
@@ -103,12 +102,12 @@ FFROBOT_NOINLINE void constraint_motion(const Mechanism<Space> &m, const Constra
       to.moment_b[i] = to.moment_a[i] = n[i];
   const auto add_turning = [&] {
     if (constraint.follows)
-      to.bias += by_turning(m, constraint.b, w, to.moment_b) - by_turning(m, constraint.a, w, to.moment_a);
+      to.bias += by_turning(constraint.b, w, to.moment_b) - by_turning(constraint.a, w, to.moment_a);
   };
   if (!located)
     return add_turning();
   Pose<T> a, b;
-  attachment_pose(m, constraint.a, w, a), attachment_pose(m, constraint.b, w, b);
+  attachment_pose(constraint.a, w, a), attachment_pose(constraint.b, w, b);
   T d[3], d_dot[3];
   for (int i = 0; i < 3; ++i)
     d[i] = b.r[i] - a.r[i], d_dot[i] = b.v[i] - a.v[i];
@@ -176,31 +175,30 @@ FFROBOT_INLINE void write_point_forces(const Body &body, int port, const State &
 // What equations that move measure by velocities and, at the ground, by its acceleration -g; of others that is in
 // w.lift
 template <class Space, class T, int W>
-FFROBOT_INLINE void measure_velocities(const Mechanism<Space> &m, const Workspace<Space, T> &w, Delassus<T, W> &S) {
+FFROBOT_INLINE void measure_velocities(const Workspace<Space, T> &w, Delassus<T, W> &S) {
   ConstraintMotion<T> motion;
   for (std::size_t k = 0; k < w.active.size(); ++k) {
-    const Constraint &constraint = m.constraints[w.active[k]];
+    const Constraint &constraint = w.m.constraints[w.active[k]];
     if (!constraint.moves && !constraint.follows)
       continue;
-    constraint_motion(m, constraint, w, constraint.moves, motion);
+    constraint_motion(constraint, w, constraint.moves, motion);
     T along(0.);
     for (int i = 0; i < Space::linear; ++i)
-      along += m.gravity[i] * motion.force[i];
+      along += w.m.gravity[i] * motion.force[i];
     S[k + 1].add(0, -(motion.bias + double((constraint.a.node < 0) - (constraint.b.node < 0)) * along));
   }
 }
 
 // What acts on ports before outboard subtrees: constraint equations in their columns, wrenches in column 0.
 template <class Space, class T, int W>
-FFROBOT_INLINE void act_on_ports(const Mechanism<Space> &m, const Forces<T> &forces, Workspace<Space, T> &w,
-                                 Delassus<T, W> &S) {
+FFROBOT_INLINE void act_on_ports(const Forces<T> &forces, Workspace<Space, T> &w, Delassus<T, W> &S) {
   constexpr int d = Space::dim, stride = stride_of(W);
   ConstraintMotion<T> motion;
   T x[d];
   const T *point_force = w.point_force.data();
-  for (const auto &actions : m.actions) {
+  for (const auto &actions : w.m.actions) {
     T *P = w.force.data() + actions.global_port * d * stride; // number by number: columns are known at run time
-    const auto &body = m.nodes[actions.node].body;
+    const auto &body = w.m.nodes[actions.node].body;
     const auto &state = w.bodies[actions.node];
     const bool has_points = W > 1 && actions.has_points;
     for (int i = has_points ? Space::linear : 0; i < d; ++i)
@@ -215,7 +213,7 @@ FFROBOT_INLINE void act_on_ports(const Mechanism<Space> &m, const Forces<T> &for
       if (action.is_point || (action.constraint >= 0 ? W == 1 || column == 0 : !forces.wrench))
         continue;
       if (action.constraint >= 0) {
-        constraint_motion(m, m.constraints[action.constraint], w, m.constraints[action.constraint].moves, motion);
+        constraint_motion(w.m.constraints[action.constraint], w, w.m.constraints[action.constraint].moves, motion);
         in_port_axes(body, actions.port, state, motion.force, action.sign > 0 ? motion.moment_b : motion.moment_a, x);
       } else {
         const T *from = forces.wrench + action.wrench * d;
@@ -228,8 +226,8 @@ FFROBOT_INLINE void act_on_ports(const Mechanism<Space> &m, const Forces<T> &for
         P[i * stride + column] += action.sign * x[i];
     }
   }
-  if (W > 1 && m.has_moving_constraints)
-    measure_velocities(m, w, S);
+  if (W > 1 && w.m.has_moving_constraints)
+    measure_velocities(w, S);
 }
 
 } // namespace ffrobot::recursion

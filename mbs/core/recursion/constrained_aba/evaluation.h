@@ -12,17 +12,17 @@
 namespace ffrobot::recursion {
 
 template <class Space, class T, int W>
-FFROBOT_NOINLINE void evaluate(const Mechanism<Space> &m, const T *q, const T *v, const Forces<T> &forces,
-                               bool is_placed, const T *target, Workspace<Space, T> &w, T *a) {
+FFROBOT_NOINLINE void evaluate(const T *q, const T *v, const Forces<T> &forces, bool is_placed, const T *target,
+                               Workspace<Space, T> &w, T *a) {
   using Cols = Pack<T, W>;
   Delassus<T, W> S;
   Cols gamma;
   if (!is_placed)
-    kinematic_pass(m, q, v, forces, w);
+    kinematic_pass(q, v, forces, w);
   if constexpr (W == most_columns)
-    backward_pass_of_block(m, q, v, forces, w, S, gamma);
+    backward_pass_of_block(q, v, forces, w, S, gamma);
   else
-    backward_pass<Space, T, W>(m, q, v, forces, w, S, gamma);
+    backward_pass<Space, T, W>(q, v, forces, w, S, gamma);
   Cols y = Cols::zero();
   y.set(0, T(1.));
   if constexpr (W > 1) {
@@ -47,9 +47,9 @@ FFROBOT_NOINLINE void evaluate(const Mechanism<Space> &m, const T *q, const T *v
   }
   w.target = target;
   if constexpr (W == most_columns)
-    acceleration_pass_of_block<false>(m, q, y, w, a);
+    acceleration_pass_of_block<false>(q, y, w, a);
   else
-    acceleration_pass<false, Space, T, W>(m, q, y, w, a);
+    acceleration_pass<false, Space, T, W>(q, y, w, a);
   ++w.evaluations;
 }
 
@@ -71,22 +71,21 @@ template <class Space, class F> FFROBOT_INLINE void with_columns(int columns, co
 }
 
 template <class Space, class T>
-FFROBOT_INLINE void evaluate(const Mechanism<Space> &m, const T *q, const T *v, const Forces<T> &forces, bool is_placed,
-                             const T *target, Workspace<Space, T> &w, T *a) {
+FFROBOT_INLINE void evaluate(const T *q, const T *v, const Forces<T> &forces, bool is_placed, const T *target,
+                             Workspace<Space, T> &w, T *a) {
   if (!w.blocks.empty())
-    return evaluate_in_blocks(m, q, v, forces, is_placed, target, w, a);
-  with_columns<Space>(w.columns, [&](auto W) { evaluate<Space, T, W>(m, q, v, forces, is_placed, target, w, a); });
+    return evaluate_in_blocks(q, v, forces, is_placed, target, w, a);
+  with_columns<Space>(w.columns, [&](auto W) { evaluate<Space, T, W>(q, v, forces, is_placed, target, w, a); });
 }
 
 template <class Space, class T>
-void accelerations(const Mechanism<Space> &m, const T *q, const T *v, const Forces<T> &forces, const T *target,
-                   Workspace<Space, T> &w, T *a) {
-  evaluate(m, q, v, forces, false, target, w, a);
+void accelerations(const T *q, const T *v, const Forces<T> &forces, const T *target, Workspace<Space, T> &w, T *a) {
+  evaluate(q, v, forces, false, target, w, a);
 }
 
 template <class Space, class T>
 void accelerations(const Placed<Space, T> &at, const std::type_identity_t<T> *wrench, const T *target, T *a) {
-  evaluate(at.m, at.q, at.v, Forces<T>{at.generalized, wrench}, true, target, at.w, a);
+  evaluate(at.q, at.v, Forces<T>{at.generalized, wrench}, true, target, at.w, a);
 }
 
 // Of constraint equations, those that are active, into w.y
@@ -97,29 +96,27 @@ template <class Space, class T> void put_active(const T *of_all, Workspace<Space
 }
 
 // What the multipliers in w.y do
-template <class Space, class T> void respond(const Mechanism<Space> &m, const T *q, Workspace<Space, T> &w, T *dq) {
+template <class Space, class T> void respond(const T *q, Workspace<Space, T> &w, T *dq) {
   if (!w.blocks.empty())
-    return accelerate_in_blocks<true>(m, q, w, dq);
+    return accelerate_in_blocks<true>(q, w, dq);
   with_columns<Space>(w.columns, [&](auto W) {
     const auto y = Pack<T, W>::read(w.y.data());
     if constexpr (W == most_columns)
-      acceleration_pass_of_block<true>(m, q, y, w, dq);
+      acceleration_pass_of_block<true>(q, y, w, dq);
     else
-      acceleration_pass<true, Space, T, W>(m, q, y, w, dq);
+      acceleration_pass<true, Space, T, W>(q, y, w, dq);
   });
 }
 
-template <class Space, class T>
-void respond(const Mechanism<Space> &m, const T *q, const T *lambda, Workspace<Space, T> &w, T *dq) {
+template <class Space, class T> void respond(const T *q, const T *lambda, Workspace<Space, T> &w, T *dq) {
   put_active(lambda, w);
   w.target = nullptr;
-  respond(m, q, w, dq);
+  respond(q, w, dq);
 }
 
 // Parts of a sum that cancel are rounded by other shares each.
 template <class Space, class T>
-void round_off(const Mechanism<Space> &m, const T *q, const std::type_identity_t<T> &relative, Workspace<Space, T> &w,
-               T *dq) {
+void round_off(const T *q, const std::type_identity_t<T> &relative, Workspace<Space, T> &w, T *dq) {
   constexpr double golden = 0.6180339887498949; // its multiples are spread over [0, 1)
   put_active(w.lambda.data(), w);
   w.y[0] = relative;
@@ -128,37 +125,35 @@ void round_off(const Mechanism<Space> &m, const T *q, const std::type_identity_t
     w.y[r] *= -(0.5 + x - std::floor(x)) * relative;
   }
   w.target = w.nothing.data();
-  respond(m, q, w, dq);
+  respond(q, w, dq);
 }
 
-template <class Space, class T>
-void response(const Mechanism<Space> &m, const T *q, const T *residual, Workspace<Space, T> &w, T *dq) {
+template <class Space, class T> void response(const T *q, const T *residual, Workspace<Space, T> &w, T *dq) {
   put_active(residual, w);
   solve_factorised(w.factor.data(), w.factored(), w.y.data() + 1);
   w.target = nullptr;
-  respond(m, q, w, dq);
+  respond(q, w, dq);
 }
 
 template <class Space, class T>
-Placed<Space, T> place_all(const Mechanism<Space> &m, const T *q, const T *v,
-                           const std::type_identity_t<T> *generalized, Workspace<Space, T> &w) {
-  kinematics(m, q, v, Forces<T>{generalized, nullptr}, w);
-  locate(m, q, w);
-  return {m, w, q, v, generalized};
+Placed<Space, T> place_all(const T *q, const T *v, const std::type_identity_t<T> *generalized, Workspace<Space, T> &w) {
+  kinematics(q, v, Forces<T>{generalized, nullptr}, w);
+  locate(q, w);
+  return {w, q, v, generalized};
 }
 
 template <class Space, class T>
-Placed<Space, T> measure(const Mechanism<Space> &m, const T *q, const T *v, Workspace<Space, T> &w, T *value, T *rate) {
-  const Placed<Space, T> at = place_all(m, q, v, nullptr, w);
+Placed<Space, T> measure(const T *q, const T *v, Workspace<Space, T> &w, T *value, T *rate) {
+  const Placed<Space, T> at = place_all(q, v, nullptr, w);
   T d[3], d_dot[3]; // between two points, of which several equations in turn are components
   const Constraint *of = nullptr;
-  for (std::size_t r = 0; r < m.constraints.size(); ++r) {
-    const Constraint &constraint = m.constraints[r];
+  for (std::size_t r = 0; r < w.m.constraints.size(); ++r) {
+    const Constraint &constraint = w.m.constraints[r];
     value[r] = rate[r] = T(0.);
     if (constraint.model.kind == ConstraintKind::point) {
       if (!of || !(of->a == constraint.a && of->b == constraint.b)) {
         Pose<T> a, b;
-        attachment_motion(m, constraint.a, w, a), attachment_motion(m, constraint.b, w, b);
+        attachment_motion(constraint.a, w, a), attachment_motion(constraint.b, w, b);
         for (int i = 0; i < 3; ++i)
           d[i] = b.r[i] - a.r[i], d_dot[i] = b.v[i] - a.v[i];
         of = &constraint;
@@ -167,11 +162,11 @@ Placed<Space, T> measure(const Mechanism<Space> &m, const T *q, const T *v, Work
         value[r] += constraint.model.f[i] * d[i], rate[r] += constraint.model.f[i] * d_dot[i];
     } else if (constraint.model.kind != ConstraintKind::coordinate) {
       ConstraintMotion<T> motion;
-      constraint_motion(m, constraint, w, true, motion);
+      constraint_motion(constraint, w, true, motion);
       value[r] = motion.value, rate[r] = motion.rate;
     }
     if (constraint.node >= 0) {
-      const Node<Space> &node = m.nodes[constraint.node];
+      const Node<Space> &node = w.m.nodes[constraint.node];
       value[r] += constraint.share * q[node.q + constraint.freedom],
           rate[r] += constraint.share * v[node.v + constraint.freedom];
     }
@@ -180,7 +175,8 @@ Placed<Space, T> measure(const Mechanism<Space> &m, const T *q, const T *v, Work
 }
 
 template <class Space, class T>
-Workspace<Space, T>::Workspace(const Mechanism<Space> &m) : hinges(m.nodes.size()), frames(m.nodes.size()) {
+Workspace<Space, T>::Workspace(const Mechanism<Space> &mechanism)
+    : m(mechanism), hinges(m.nodes.size()), frames(m.nodes.size()) {
   const int needed = static_cast<int>(m.constraints.size()) + 1;
   columns = *std::find_if(std::begin(column_counts<Space>), std::end(column_counts<Space>) - 1,
                           [&](int c) { return c >= needed; });
@@ -256,22 +252,18 @@ template <class Space, class T> void Workspace<Space, T>::keep(std::vector<int> 
 
 #define FFROBOT_EVALUATION(Space, T)                                                                                   \
   template struct Workspace<Space, T>;                                                                                 \
-  template Placed<Space, T> place_all(const Mechanism<Space> &, const T *, const T *, const T *,                       \
-                                      Workspace<Space, T> &);                                                          \
+  template Placed<Space, T> place_all(const T *, const T *, const T *, Workspace<Space, T> &);                         \
   template void accelerations(const Placed<Space, T> &, const T *, const T *, T *);                                    \
-  template void accelerations(const Mechanism<Space> &, const T *, const T *, const Forces<T> &, const T *,            \
-                              Workspace<Space, T> &, T *);                                                             \
-  template Placed<Space, T> measure(const Mechanism<Space> &, const T *, const T *, Workspace<Space, T> &, T *, T *);  \
+  template void accelerations(const T *, const T *, const Forces<T> &, const T *, Workspace<Space, T> &, T *);         \
+  template Placed<Space, T> measure(const T *, const T *, Workspace<Space, T> &, T *, T *);                            \
   template Pose<T> wrench_pose(const Placed<Space, T> &, int);                                                         \
   template void cut_rates(const Placed<Space, T> &, const std::vector<CutJoint> &, T *);                               \
   template void add_along_cuts(const Placed<Space, T> &, const std::vector<CutJoint> &, const T *, T *)
 
 // Of doubles besides
 #define FFROBOT_RESPONSES(Space)                                                                                       \
-  template void respond(const Mechanism<Space> &, const double *, const double *, Workspace<Space, double> &,          \
-                        double *);                                                                                     \
-  template void round_off(const Mechanism<Space> &, const double *, const double &, Workspace<Space, double> &,        \
-                          double *);                                                                                   \
-  template void response(const Mechanism<Space> &, const double *, const double *, Workspace<Space, double> &, double *)
+  template void respond(const double *, const double *, Workspace<Space, double> &, double *);                         \
+  template void round_off(const double *, const double &, Workspace<Space, double> &, double *);                       \
+  template void response(const double *, const double *, Workspace<Space, double> &, double *)
 
 } // namespace ffrobot::recursion

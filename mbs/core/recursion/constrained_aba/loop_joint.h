@@ -2,6 +2,7 @@
 // as a moment or force on the second one and its opposite on the first.
 #pragma once
 
+#include "core/fields.h"
 #include "core/recursion/joint/friction.h"
 #include "core/recursion/mechanism/workspace.h"
 
@@ -14,8 +15,10 @@ namespace ffrobot::recursion {
 struct CutJoint {
   int a = 0, b = 0; // wrenches
   bool turns = true;
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ(); // in axes of section a
+  Vector3d axis = Vector3d::UnitZ(); // in axes of section a
   Friction friction;
+
+  FFROBOT_FIELDS(a, b, turns, axis, friction);
 };
 
 // Rates (cuts) rad/s, m/s

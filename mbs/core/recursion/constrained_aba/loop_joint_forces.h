@@ -10,7 +10,7 @@ namespace ffrobot::recursion {
 
 template <class Space, class T> Pose<T> wrench_pose(const Placed<Space, T> &at, int wrench) {
   Pose<T> found;
-  attachment_pose(at.m, at.m.wrenches[wrench], at.w, found);
+  attachment_pose(at.w.m.wrenches[wrench], at.w, found);
   return found;
 }
 

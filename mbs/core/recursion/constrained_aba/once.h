@@ -7,13 +7,11 @@
 namespace ffrobot::recursion {
 
 #define FFROBOT_ONCE(prefix, Space)                                                                                    \
-  prefix void kinematics(const Mechanism<Space> &, const double *, const double *, const Forces<double> &,             \
-                         Workspace<Space, double> &);                                                                  \
-  prefix void locate(const Mechanism<Space> &, const double *, Workspace<Space, double> &);                            \
+  prefix void kinematics(const double *, const double *, const Forces<double> &, Workspace<Space, double> &);          \
+  prefix void locate(const double *, Workspace<Space, double> &);                                                      \
   prefix void evaluate_inertia(const Node<Space> &, const double *, const double *, Space::State<double> &,            \
                                Pack<double, Space::dim> *, double *);                                                  \
-  prefix void constraint_motion(const Mechanism<Space> &, const Constraint &, const Workspace<Space, double> &, bool,  \
-                                ConstraintMotion<double> &)
+  prefix void constraint_motion(const Constraint &, const Workspace<Space, double> &, bool, ConstraintMotion<double> &)
 
 #define FFROBOT_ONCE_PLANAR(prefix)                                                                                    \
   prefix planar::Inertia<double> planar::bent_inertia(const planar::Body &, const double *, const double *,            \

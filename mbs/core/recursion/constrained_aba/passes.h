@@ -8,55 +8,52 @@
 namespace ffrobot::recursion {
 
 template <class Space, class T>
-FFROBOT_INLINE void kinematic_pass(const Mechanism<Space> &m, const T *q, const T *v, const Forces<T> &forces,
-                                   Workspace<Space, T> &w) {
-  kinematics(m, q, v, forces, w);
-  if (m.needs_positions)
-    locate(m, q, w);
+FFROBOT_INLINE void kinematic_pass(const T *q, const T *v, const Forces<T> &forces, Workspace<Space, T> &w) {
+  kinematics(q, v, forces, w);
+  if (w.m.needs_positions)
+    locate(q, w);
 }
 
 // C M^-1 C^T of the active constraint equations, and what they measure
 template <class Space, class T, int W>
-FFROBOT_INLINE void backward_pass(const Mechanism<Space> &m, const T *q, const T *v, const Forces<T> &forces,
-                                  Workspace<Space, T> &w, Delassus<T, W> &S, Pack<T, W> &gamma) {
+FFROBOT_INLINE void backward_pass(const T *q, const T *v, const Forces<T> &forces, Workspace<Space, T> &w,
+                                  Delassus<T, W> &S, Pack<T, W> &gamma) {
   gamma = Pack<T, W>::zero();
   for (int r = 0; r < W; ++r)
     S[r] = Pack<T, W>::zero();
-  act_on_ports<Space, T, W>(m, forces, w, S);
+  act_on_ports<Space, T, W>(forces, w, S);
   for (std::size_t i = w.hinges.size(); i-- > 0;) {
     if constexpr (Space::dim == 3)
-      if (m.nodes[i].is_pin) {
-        eliminate_pin<T, W>(m, i, q, v, forces, w, S, gamma);
+      if (w.m.nodes[i].is_pin) {
+        eliminate_pin<T, W>(i, q, v, forces, w, S, gamma);
         continue;
       }
-    eliminate_body<Space, T, W>(m, m.nodes[i], q, v, forces, w, S, gamma);
+    eliminate_body<Space, T, W>(w.m.nodes[i], q, v, forces, w, S, gamma);
   }
 }
 
 template <bool by_multipliers, class Space, class T, int W>
-FFROBOT_INLINE void acceleration_pass(const Mechanism<Space> &m, const T *q, const Pack<T, W> &y,
-                                      Workspace<Space, T> &w, T *a) {
+FFROBOT_INLINE void acceleration_pass(const T *q, const Pack<T, W> &y, Workspace<Space, T> &w, T *a) {
   for (std::size_t i = 0; i < w.hinges.size(); ++i) {
     if constexpr (Space::dim == 3)
-      if (m.nodes[i].is_pin) {
-        accelerate_pin<by_multipliers, T, W>(m, i, q, w, y, a);
+      if (w.m.nodes[i].is_pin) {
+        accelerate_pin<by_multipliers, T, W>(i, q, w, y, a);
         continue;
       }
-    accelerate_body<Space, T, W>(m, m.nodes[i], q, by_multipliers, w, y, a);
+    accelerate_body<Space, T, W>(w.m.nodes[i], q, by_multipliers, w, y, a);
   }
 }
 
 // The last two of the most columns, once for all who ask
 template <class Space, class T>
-FFROBOT_NOINLINE void backward_pass_of_block(const Mechanism<Space> &m, const T *q, const T *v, const Forces<T> &forces,
-                                             Workspace<Space, T> &w, Delassus<T, most_columns> &S,
-                                             Pack<T, most_columns> &gamma) {
-  backward_pass<Space, T, most_columns>(m, q, v, forces, w, S, gamma);
+FFROBOT_NOINLINE void backward_pass_of_block(const T *q, const T *v, const Forces<T> &forces, Workspace<Space, T> &w,
+                                             Delassus<T, most_columns> &S, Pack<T, most_columns> &gamma) {
+  backward_pass<Space, T, most_columns>(q, v, forces, w, S, gamma);
 }
 template <bool by_multipliers, class Space, class T>
-FFROBOT_NOINLINE void acceleration_pass_of_block(const Mechanism<Space> &m, const T *q, const Pack<T, most_columns> &y,
-                                                 Workspace<Space, T> &w, T *a) {
-  acceleration_pass<by_multipliers, Space, T, most_columns>(m, q, y, w, a);
+FFROBOT_NOINLINE void acceleration_pass_of_block(const T *q, const Pack<T, most_columns> &y, Workspace<Space, T> &w,
+                                                 T *a) {
+  acceleration_pass<by_multipliers, Space, T, most_columns>(q, y, w, a);
 }
 
 } // namespace ffrobot::recursion

@@ -14,10 +14,10 @@
 namespace ffrobot::recursion {
 
 // Lambda of the port's outboard subtree, whose joint is no pin (pins leave theirs there)
-template <class T> FFROBOT_INLINE void load_of_pin(const Mechanism<Planar> &m, int index, Workspace<Planar, T> &w) {
+template <class T> FFROBOT_INLINE void load_of_pin(int index, Workspace<Planar, T> &w) {
   PortWork<Planar, T> &port = w.ports[index];
   T L[2][2];
-  const Hinge<Planar, T> &hinge = w.hinges[m.children[index]];
+  const Hinge<Planar, T> &hinge = w.hinges[w.m.children[index]];
   for (int i = 0; i < 2; ++i)
     for (int j = 0; j < 2; ++j)
       L[i][j] = hinge.Lambda[i][j];
@@ -48,11 +48,11 @@ template <class T, int W> struct AlongPin {
 };
 
 template <class T, int W>
-FFROBOT_INLINE AlongPin<T, W> act_along_pin(const Mechanism<Planar> &m, const Node<Planar> &node, const T *q,
-                                            const T *v, const T *generalized, Workspace<Planar, T> &w) {
+FFROBOT_INLINE AlongPin<T, W> act_along_pin(const Node<Planar> &node, const T *q, const T *v, const T *generalized,
+                                            Workspace<Planar, T> &w) {
   const planar::Body &body = node.body;
   planar::State<T> &s = w.bodies[node.index];
-  const Pack<T, W> multipliers = multiplier_forces<T, W>(m, node, 0, w);
+  const Pack<T, W> multipliers = multiplier_forces<T, W>(node, 0, w);
   AlongPin<T, W> along{multipliers, multipliers, W > 1 && body.is_tilted && node.has_constraints};
   if (generalized)
     along.applied.set(0, generalized[node.v]);
@@ -72,9 +72,9 @@ template <class T> struct PinInertia {
 
 // The port: H and M = X^T Y X of the child's subtree, its part of C M^-1 C^T
 template <class T, int W>
-FFROBOT_INLINE PinInertia<T> eliminate_port_of_pin(const Mechanism<Planar> &m, const Node<Planar> &node,
-                                                   const AlongPin<T, W> &along, Workspace<Planar, T> &w, Pack<T, W> *H,
-                                                   Delassus<T, W> &S, Pack<T, W> &gamma) {
+FFROBOT_INLINE PinInertia<T> eliminate_port_of_pin(const Node<Planar> &node, const AlongPin<T, W> &along,
+                                                   Workspace<Planar, T> &w, Pack<T, W> *H, Delassus<T, W> &S,
+                                                   Pack<T, W> &gamma) {
   constexpr int stride = stride_of(W), tilt = planar::Body::TILT;
   using Cols = Pack<T, W>;
   const planar::Body &body = node.body;
@@ -99,7 +99,7 @@ FFROBOT_INLINE PinInertia<T> eliminate_port_of_pin(const Mechanism<Planar> &m, c
   T Y_xx(0.), Y_xy(0.), Y_yy(0.);
   if (loaded) {
     if (!node.carries_pin)
-      load_of_pin(m, index, w);
+      load_of_pin(index, w);
     const T Lx = port.Lambda_xx, Lc = port.Lambda_xy, Ly = port.Lambda_yy;
     if (constants.shifts) {
       const T det = Lx * Ly - Lc * Lc, xG = Gx * Lx, yG = Gy * Ly, cG = Gc * Lc;
@@ -145,9 +145,9 @@ FFROBOT_INLINE PinInertia<T> eliminate_port_of_pin(const Mechanism<Planar> &m, c
 
 // What is left of M (its x, y part) and H (2) once the joint has turned, in axes of the port of the parent: hinge.turn
 template <class T, int W>
-FFROBOT_INLINE void propagate_pin_to_parent(const Mechanism<Planar> &m, const Node<Planar> &node, const T &xx,
-                                            const T &xy, const T &yy, const Pack<T, W> *H, const Pack<T, W> &applied,
-                                            Workspace<Planar, T> &w, Pack<T, W> &gamma) {
+FFROBOT_INLINE void propagate_pin_to_parent(const Node<Planar> &node, const T &xx, const T &xy, const T &yy,
+                                            const Pack<T, W> *H, const Pack<T, W> &applied, Workspace<Planar, T> &w,
+                                            Pack<T, W> &gamma) {
   constexpr int stride = stride_of(W);
   using Cols = Pack<T, W>;
   Hinge<Planar, T> &hinge = w.hinges[node.index];
@@ -155,7 +155,7 @@ FFROBOT_INLINE void propagate_pin_to_parent(const Mechanism<Planar> &m, const No
   const Cols P0 = c * H[0] - n * H[1], P1 = n * H[0] + c * H[1];
   if (node.parent < 0) {
     if constexpr (W > 1)
-      gamma += T(-m.gravity[0]) * P0 + T(-m.gravity[1]) * P1;
+      gamma += T(-w.m.gravity[0]) * P0 + T(-w.m.gravity[1]) * P1;
     if (node.is_single_grounded) {
       T *on_ground = w.stored.data() + node.ground_slot() * stride;
       H[0].write(on_ground), H[1].write(on_ground + stride);
@@ -183,19 +183,18 @@ FFROBOT_INLINE void propagate_pin_to_parent(const Mechanism<Planar> &m, const No
 }
 
 template <class T, int W>
-FFROBOT_INLINE void eliminate_pin(const Mechanism<Planar> &m, std::size_t i_node, const T *q, const T *v,
-                                  const Forces<T> &forces, Workspace<Planar, T> &w, Delassus<T, W> &S,
-                                  Pack<T, W> &gamma) {
+FFROBOT_INLINE void eliminate_pin(std::size_t i_node, const T *q, const T *v, const Forces<T> &forces,
+                                  Workspace<Planar, T> &w, Delassus<T, W> &S, Pack<T, W> &gamma) {
   constexpr int tilt = planar::Body::TILT;
   using Cols = Pack<T, W>;
-  const Node<Planar> &node = m.nodes[i_node];
+  const Node<Planar> &node = w.m.nodes[i_node];
   const planar::Body &body = node.body;
   planar::State<T> &s = w.bodies[i_node];
-  const AlongPin<T, W> along = act_along_pin<T, W>(m, node, q, v, forces.generalized, w);
+  const AlongPin<T, W> along = act_along_pin<T, W>(node, q, v, forces.generalized, w);
   PinInertia<T> L;
   Cols H[3];
   if (node.outboard)
-    L = eliminate_port_of_pin<T, W>(m, node, along, w, H, S, gamma);
+    L = eliminate_port_of_pin<T, W>(node, along, w, H, S, gamma);
   else
     H[0] = H[1] = H[2] = Cols::zero();
   const planar::Inertia<T> I = inertia(body, s);
@@ -222,8 +221,7 @@ FFROBOT_INLINE void eliminate_pin(const Mechanism<Planar> &m, std::size_t i_node
   T *U_by_D = w.hinges[i_node].pin;
   U_by_D[0] = ux, U_by_D[1] = uy;
   H[0] -= M_xa * sd, H[1] -= M_ya * sd;
-  propagate_pin_to_parent<T, W>(m, node, M_xx - M_xa * ux, M_xy - M_xa * uy, M_yy - M_ya * uy, H, along.applied, w,
-                                gamma);
+  propagate_pin_to_parent<T, W>(node, M_xx - M_xa * ux, M_xy - M_xa * uy, M_yy - M_ya * uy, H, along.applied, w, gamma);
 }
 
 // Force on the port, into z as well, and its acceleration; on_modes: along the joint's coordinate, of multipliers
@@ -267,15 +265,14 @@ FFROBOT_INLINE void accelerate_port_of_pin(const Node<Planar> &node, const T &Ax
 
 // A_port (2): acceleration of the inboard port, in and out: of its own port
 template <bool by_multipliers, class T, int W>
-FFROBOT_INLINE void accelerate_pin(const Mechanism<Planar> &m, std::size_t i_node, const T *q, Workspace<Planar, T> &w,
-                                   const Pack<T, W> &y, T *a) {
-  const Node<Planar> &node = m.nodes[i_node];
+FFROBOT_INLINE void accelerate_pin(std::size_t i_node, const T *q, Workspace<Planar, T> &w, const Pack<T, W> &y, T *a) {
+  const Node<Planar> &node = w.m.nodes[i_node];
   const planar::Body &body = node.body;
   planar::State<T> &s = w.bodies[i_node];
   Hinge<Planar, T> &hinge = w.hinges[i_node];
   T Px, Py, P_rotation(0.);
   if (node.parent < 0)
-    Px = T(by_multipliers ? 0. : -m.gravity[0]), Py = T(by_multipliers ? 0. : -m.gravity[1]);
+    Px = T(by_multipliers ? 0. : -w.m.gravity[0]), Py = T(by_multipliers ? 0. : -w.m.gravity[1]);
   else {
     const T *A = w.ports[node.parent_port].A;
     Px = A[0], Py = A[1], P_rotation = A[2];
@@ -295,7 +292,7 @@ FFROBOT_INLINE void accelerate_pin(const Mechanism<Planar> &m, std::size_t i_nod
   s.A[0] = Ax, s.A[1] = Ay, s.A[2] = Aa;
   constexpr int tilt = planar::Body::TILT;
   const bool constraints_on_modes = W > 1 && body.is_tilted && node.has_constraints;
-  const T on_modes = constraints_on_modes ? multiplier_force<T, W>(m, node, 0, w, y) : T(0.); // by multipliers
+  const T on_modes = constraints_on_modes ? multiplier_force<T, W>(node, 0, w, y) : T(0.); // by multipliers
   const T on_port = by_multipliers ? T(0.) : s.on_port;
   T z[8] = {-Ax, -Ay, -Aa, T(0.), T(0.), on_port, by_multipliers ? on_modes : s.on_modes + on_modes, T(0.)};
   if (node.outboard)

@@ -50,9 +50,9 @@ Pose<double> changed(Pose<double> at, int k, double h) {
   else if (k >= 6)
     at.v[i] += h;
   else {
-    using Axes = Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>;
+    using Axes = Map<Matrix<double, 3, 3, Eigen::RowMajor>>;
     Axes R(&at.R[0][0]);
-    R = Eigen::AngleAxisd(h, Eigen::Vector3d::Unit(i)) * R.eval();
+    R = Eigen::AngleAxisd(h, Vector3d::Unit(i)) * R.eval();
     at.angle += i == 2 ? h : 0;
   }
   return at;

@@ -146,8 +146,8 @@ FFROBOT_INLINE void answer_of_port(PortWork<Space, T> &port, bool is_flexible, b
 
 // Ports of the body, one after the other: M, H, S and gamma gain their outboard subtrees.
 template <class Space, class T, int W>
-inline void eliminate_ports(const Mechanism<Space> &m, const Node<Space> &node, Workspace<Space, T> &w,
-                            Pack<T, Space::dim> *M, Pack<T, W> *H, Delassus<T, W> &S, Pack<T, W> &gamma) {
+inline void eliminate_ports(const Node<Space> &node, Workspace<Space, T> &w, Pack<T, Space::dim> *M, Pack<T, W> *H,
+                            Delassus<T, W> &S, Pack<T, W> &gamma) {
   constexpr int d = Space::dim, stride = stride_of(W);
   using Cols = Pack<T, W>;
   const bool several = node.ports() > 1;
@@ -156,10 +156,10 @@ inline void eliminate_ports(const Mechanism<Space> &m, const Node<Space> &node, 
     const int index = node.first_port + k;
     PortWork<Space, T> &port = w.ports[index];
     const bool is_flexible = node.body.ports[k].is_flexible;
-    const int child = m.children[index];
+    const int child = w.m.children[index];
     const bool loaded = child >= 0;
     if (loaded)
-      subtree_inertia<Space, T>(m.nodes[child], w.hinges[child], is_flexible, port.G, port.Y);
+      subtree_inertia<Space, T>(w.m.nodes[child], w.hinges[child], is_flexible, port.G, port.Y);
     Cols F[d];
     const T *P = w.force.data() + index * d * stride;
     for (int i = 0; i < d; ++i)

@@ -48,7 +48,7 @@ FFROBOT_NOINLINE int factors(const Node<Space> &child, const Hinge<Space, T> &hi
       c[i] = T(0.);
     for (int i = 0; i < count; ++i)
       c[kept[i]] = L[i][j];
-    forces_from_freedoms(child, hinge, c);
+    forces_by_freedoms<-1>(child, hinge, c);
     Space::template Turn<T>::add_moment(hinge.r, c);
     hinge.turn.apply(c, turned);
     C[j] = Pack<T, d>::zero(); // lanes beyond d are summed up, too

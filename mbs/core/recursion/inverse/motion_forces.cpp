@@ -7,14 +7,11 @@
 
 namespace ffrobot::recursion {
 
-using Eigen::Index;
-using Eigen::Vector3d;
-
 namespace {
 
-using Motion = Eigen::Map<Eigen::Matrix<double, 9, 1>>;
+using Motion = Map<Matrix<double, 9, 1>>;
 
-double *block(MotionForces::Table &table, Index row, Index size, std::size_t number) {
+double *block(RowMajor &table, Index row, Index size, std::size_t number) {
   return table.row(row).data() + size * number;
 }
 
@@ -46,7 +43,7 @@ template <class Space> std::vector<std::array<int, 2>> ForcesOfStates<Space>::se
 
 template <class Space>
 ForcesOfStates<Space>::ForcesOfStates(const Mechanism<Space> &mechanism, Index states) : mechanism_(mechanism) {
-  const auto resize = [states](MotionForces::Table &table, std::size_t size, std::size_t count) {
+  const auto resize = [states](RowMajor &table, std::size_t size, std::size_t count) {
     table.setZero(states, size * count);
   };
   const std::size_t bodies = mechanism.nodes.size(), wrenches = mechanism.wrenches.size();
@@ -64,7 +61,7 @@ void ForcesOfStates<Space>::write_loads(Index i, const double *lambda, NewtonEul
   write_joints(i, forces, w);
   ConstraintMotion<double> motion;
   for (std::size_t r = 0; r < mechanism_.constraints.size(); ++r) {
-    constraint_motion(mechanism_, mechanism_.constraints[r], w, mechanism_.constraints[r].moves, motion);
+    constraint_motion(mechanism_.constraints[r], w, mechanism_.constraints[r].moves, motion);
     double *to = block(found_.constraints, i, 2 * Space::dim, r);
     write_wrench<Space>(motion.force, motion.moment_a, lambda[r], to);
     write_wrench<Space>(motion.force, motion.moment_b, -lambda[r], to + Space::dim);
@@ -84,7 +81,7 @@ void ForcesOfStates<Space>::write(Index i, const double *q, const double *v, con
     std::copy_n(wrench, found_.wrenches.cols(), found_.wrenches.row(i).data());
   forces.require_of_modes(q, a, w, found_.modal.row(i).data());
   forces.leave_frames(w);
-  const std::vector<FrameMotion> frames = frame_motions(mechanism_, q, v, w);
+  const std::vector<FrameMotion> frames = frame_motions(q, v, w);
   for (std::size_t k = 0; k < frames.size(); ++k)
     Motion(block(found_.bodies, i, 9, k)) << frames[k].a_origin, frames[k].alpha, frames[k].omega;
 }
@@ -120,7 +117,7 @@ void ForcesOfStates<Space>::write_point(const Attachment &at, const NewtonEuler<
                  global.data());
   const auto [a, alpha] = in_three_axes<Space>(global);
   Pose<double> pose;
-  attachment_motion(mechanism_, at, w, pose);
+  attachment_motion(at, w, pose);
   Motion found(to);
   found << a, alpha, pose.omega[0], pose.omega[1], pose.omega[2];
   found.head(mechanism_.gravity.size()) += mechanism_.gravity;

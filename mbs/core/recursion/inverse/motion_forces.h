@@ -3,7 +3,7 @@
 
 #include "core/recursion/newton_euler/newton_euler.h"
 
-#include <Eigen/Core>
+#include "core/eigen.h"
 
 #include <array>
 #include <vector>
@@ -13,29 +13,27 @@ namespace ffrobot::recursion {
 // A row for each state, global axes. Forces come with their moments about the origin of the section on which they act:
 // (x, y, moment) in the plane, (x, y, z, mx, my, mz) in space.
 struct MotionForces {
-  using Table = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-  Table bodies;      // 9 of each: acceleration and angular acceleration of its data's origin, angular velocity
-  Table points;      // 9 of each section on which a wrench may act: the same
-  Table sections;    // of each section of bodies where joints, constraints or wrenches are: all that acts there
-  Table joints;      // of each body: what its joint does to its outer section
-  Table constraints; // of each: on its section a, then on its section b
-  Table wrenches;    // of each section on which a wrench may act: given forces alone
-  Table modal;       // (n_v) see NewtonEuler::require_of_modes
-  Table rotors;      // 3 of each body: rate of angular momentum of the rotor in its joint
+  RowMajor bodies;      // 9 of each: acceleration and angular acceleration of its data's origin, angular velocity
+  RowMajor points;      // 9 of each section on which a wrench may act: the same
+  RowMajor sections;    // of each section of bodies where joints, constraints or wrenches are: all that acts there
+  RowMajor joints;      // of each body: what its joint does to its outer section
+  RowMajor constraints; // of each: on its section a, then on its section b
+  RowMajor wrenches;    // of each section on which a wrench may act: given forces alone
+  RowMajor modal;       // (n_v) see NewtonEuler::require_of_modes
+  RowMajor rotors;      // 3 of each body: rate of angular momentum of the rotor in its joint
 };
 
 template <class Space> class ForcesOfStates {
 public:
-  ForcesOfStates(const Mechanism<Space> &mechanism, Eigen::Index states); // the mechanism must outlive this
+  ForcesOfStates(const Mechanism<Space> &mechanism, Index states); // the mechanism must outlive this
 
   // Row i, after prepare() without generalized forces, accelerate() and load() of lambda (constraints) and of `wrench`
   // (wrenches, dim; may be null)
-  void write(Eigen::Index i, const double *q, const double *v, const double *a, const double *lambda,
-             const double *wrench, NewtonEuler<Space> &forces, Workspace<Space, double> &w);
+  void write(Index i, const double *q, const double *v, const double *a, const double *lambda, const double *wrench,
+             NewtonEuler<Space> &forces, Workspace<Space, double> &w);
 
   // Joints and constraints of row i: what lambda does by itself, after load() of it
-  void write_loads(Eigen::Index i, const double *lambda, NewtonEuler<Space> &forces, const Workspace<Space, double> &w);
+  void write_loads(Index i, const double *lambda, NewtonEuler<Space> &forces, const Workspace<Space, double> &w);
 
   const MotionForces &found() const { return found_; }
 
@@ -43,8 +41,8 @@ public:
   static std::vector<std::array<int, 2>> sections(const Mechanism<Space> &mechanism);
 
 private:
-  void write_joints(Eigen::Index i, const NewtonEuler<Space> &forces, const Workspace<Space, double> &w);
-  void write_sections(Eigen::Index i, const NewtonEuler<Space> &forces, const Workspace<Space, double> &w);
+  void write_joints(Index i, const NewtonEuler<Space> &forces, const Workspace<Space, double> &w);
+  void write_sections(Index i, const NewtonEuler<Space> &forces, const Workspace<Space, double> &w);
   void write_point(const Attachment &at, const NewtonEuler<Space> &forces, const Workspace<Space, double> &w,
                    double *to) const;
 

@@ -7,9 +7,6 @@
 
 namespace ffrobot::recursion {
 
-using Eigen::Index;
-using Eigen::VectorXd;
-
 template <class Space>
 DrivenMechanism<Space>::DrivenMechanism(const Mechanism<Space> &m, const Scene &s,
                                         std::vector<Motor> of_joints_and_cuts, std::vector<char> of_path)
@@ -56,13 +53,13 @@ template <class Space> const VectorXd &Motors<Space>::find(const double *q, cons
   return tau_;
 }
 
-template <class Space> void Motors<Space>::project(const double *q, const TreeWorkspace &w, Eigen::Ref<VectorXd> Q) {
+template <class Space> void Motors<Space>::project(const double *q, const TreeWorkspace &w, Ref<VectorXd> Q) {
   forces_.load(lambda_.data(), nullptr, w);
   forces_.project(q, w, Q.data());
 }
 
 template <class Space> void Motors<Space>::take_path(const double *lambda) {
-  lambda_ = Eigen::Map<const VectorXd>(lambda, lambda_.size());
+  lambda_ = Map<const VectorXd>(lambda, lambda_.size());
   for (const int row : cuts_)
     lambda_[row] = 0;
 }
@@ -111,12 +108,12 @@ template <class Space> void Motors<Space>::split(const double *q, const TreeWork
   Q_ += beside_;
 }
 
-template <class Space> Eigen::MatrixXd Motors<Space>::shares_of(const Eigen::MatrixXd &dQ) const {
+template <class Space> MatrixXd Motors<Space>::shares_of(const MatrixXd &dQ) const {
   const Index modes = driven_.of_modes.size();
-  Eigen::MatrixXd found(modes + tau_.size(), dQ.cols());
+  MatrixXd found(modes + tau_.size(), dQ.cols());
   found.topRows(modes) = dQ(driven_.of_modes, Eigen::all);
   if (!cuts_.empty()) {
-    const Eigen::MatrixXd solved = factors_.solve(dQ(driven_.of_joints, Eigen::all).eval());
+    const MatrixXd solved = factors_.solve(dQ(driven_.of_joints, Eigen::all).eval());
     found.topRows(modes) -= matrix_product(columns_(driven_.of_modes, Eigen::all), solved);
     found.bottomRows(tau_.size()) = solved.bottomRows(tau_.size());
   } else

@@ -43,35 +43,35 @@ public:
   // In place of the multipliers lambda (constraint equations) of a path; of generalized forces Q (n_v). `w` has the
   // kinematics of a state at q, and its frames where constraint equations or cut joints ask for these.
   void resolve(const double *q, const double *lambda, const TreeWorkspace &w);
-  void split(const double *q, const Eigen::VectorXd &Q, const TreeWorkspace &w);
+  void split(const double *q, const VectorXd &Q, const TreeWorkspace &w);
   // After split(): (modes + motors, …) of other forces dQ (n_v, …) what motors and loops leave, as they are then, and
   // tau
-  Eigen::MatrixXd shares_of(const Eigen::MatrixXd &dQ) const;
+  MatrixXd shares_of(const MatrixXd &dQ) const;
   // -C_s^T lambda_s (n_v) of the path
-  const Eigen::VectorXd &path_forces(const double *q, const double *lambda, const TreeWorkspace &w);
+  const VectorXd &path_forces(const double *q, const double *lambda, const TreeWorkspace &w);
   // What the path does on each body alone (dim + n): see NewtonEuler::on_body
-  std::vector<Eigen::VectorXd> path_forces_on_bodies(const double *lambda, const TreeWorkspace &w);
+  std::vector<VectorXd> path_forces_on_bodies(const double *lambda, const TreeWorkspace &w);
 
   std::vector<bool> are_moments() const override;
-  const Eigen::VectorXd &find(const double *q, const TreeWorkspace &w) override; // tau()
+  const VectorXd &find(const double *q, const TreeWorkspace &w) override; // tau()
 
-  const Eigen::VectorXd &tau() const { return tau_; }        // (motors)
-  const Eigen::VectorXd &left() const { return Q_; }         // (n_v) along modes: F_p
-  const Eigen::VectorXd &beside() const { return beside_; }  // (n_v) the share of left() since motors turn frames
-  const Eigen::VectorXd &loops() const { return lambda_c_; } // (constraint equations of loops)
+  const VectorXd &tau() const { return tau_; }        // (motors)
+  const VectorXd &left() const { return Q_; }         // (n_v) along modes: F_p
+  const VectorXd &beside() const { return beside_; }  // (n_v) the share of left() since motors turn frames
+  const VectorXd &loops() const { return lambda_c_; } // (constraint equations of loops)
 
 private:
-  void take_path(const double *lambda);                                                 // into lambda_
-  void project(const double *q, const TreeWorkspace &w, Eigen::Ref<Eigen::VectorXd> Q); // of lambda_
-  void split(const double *q, const TreeWorkspace &w);                                  // Q_
+  void take_path(const double *lambda);                                   // into lambda_
+  void project(const double *q, const TreeWorkspace &w, Ref<VectorXd> Q); // of lambda_
+  void split(const double *q, const TreeWorkspace &w);                    // Q_
   void close_loops(const double *q, const TreeWorkspace &w);
 
   const DrivenMechanism<Space> driven_;
   NewtonEuler<Space> forces_;
   std::vector<int> cuts_; // constraint equations of loops; without any, what motors do is known without equations
-  Eigen::VectorXd lambda_, tau_, Q_, beside_, lambda_c_;
-  Eigen::MatrixXd columns_; // (n_v, cuts, then motors) -C_c^T, T^T
-  LeastNorm factors_;       // of joint coordinates by cuts, then motors
+  VectorXd lambda_, tau_, Q_, beside_, lambda_c_;
+  MatrixXd columns_;  // (n_v, cuts, then motors) -C_c^T, T^T
+  LeastNorm factors_; // of joint coordinates by cuts, then motors
 };
 
 extern template class Motors<Planar>;

@@ -7,9 +7,6 @@
 
 namespace ffrobot::recursion {
 
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-
 namespace {
 
 Vector3d vector(const double *x) { return {x[0], x[1], x[2]}; }
@@ -35,7 +32,7 @@ struct Inertia {
   double modal;
 };
 
-double half_square(int n, const double *v) { return 0.5 * Eigen::Map<const Eigen::VectorXd>(v, n).squaredNorm(); }
+double half_square(int n, const double *v) { return 0.5 * Map<const VectorXd>(v, n).squaredNorm(); }
 
 Inertia inertia_of(const planar::Body &b, const double *p, const double *v, planar::State<double> &s) {
   Inertia to{b.mass, Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), Matrix3d::Zero(), half_square(b.n, v)};
@@ -72,9 +69,8 @@ Inertia inertia_of(const spatial::Body &b, const double *, const double *v, spat
 }
 
 // Axes of the section that the joint holds
-template <class Space>
-Matrix3d outer_axes(const Mechanism<Space> &m, std::size_t i, const Workspace<Space, double> &w) {
-  const Node<Space> &node = m.nodes[i];
+template <class Space> Matrix3d outer_axes(std::size_t i, const Workspace<Space, double> &w) {
+  const Node<Space> &node = w.m.nodes[i];
   if (node.inboard < 0)
     return axes(w.frames[i]);
   Pose<double> section;
@@ -84,7 +80,7 @@ Matrix3d outer_axes(const Mechanism<Space> &m, std::size_t i, const Workspace<Sp
 
 void write_motion(const Pose<double> &of, double *to) {
   const Matrix3d R = axes(of);
-  Eigen::Map<Eigen::Matrix<double, 18, 1>> found(to);
+  Map<Matrix<double, 18, 1>> found(to);
   found << vector(of.r), R.row(0).transpose(), R.row(1).transpose(), R.row(2).transpose(), vector(of.v),
       vector(of.omega);
 }
@@ -92,18 +88,17 @@ void write_motion(const Pose<double> &of, double *to) {
 } // namespace
 
 template <class Space>
-std::vector<FrameMotion> frame_motions(const Mechanism<Space> &m, const double *q, const double *v,
-                                       Workspace<Space, double> &w) {
-  place_all(m, q, v, nullptr, w);
+std::vector<FrameMotion> frame_motions(const double *q, const double *v, Workspace<Space, double> &w) {
+  place_all(q, v, nullptr, w);
   Vector3d g = Vector3d::Zero();
-  g.head(m.gravity.size()) = m.gravity;
+  g.head(w.m.gravity.size()) = w.m.gravity;
   std::vector<FrameMotion> all;
-  for (std::size_t i = 0; i < m.nodes.size(); ++i) {
+  for (std::size_t i = 0; i < w.m.nodes.size(); ++i) {
     const Pose<double> &frame = w.frames[i];
     const auto [a, alpha] = parts(w.bodies[i]);
     const Matrix3d R = axes(frame);
     const Vector3d acceleration = R * a + g, turning = R * alpha, omega = vector(frame.omega);
-    const Vector3d d = R * m.nodes[i].origin;
+    const Vector3d d = R * w.m.nodes[i].origin;
     const Vector3d at_origin = acceleration + turning.cross(d) + omega.cross(omega.cross(d));
     all.push_back({vector(frame.r), vector(frame.v), acceleration, omega, turning, R, frame.angle, at_origin});
   }
@@ -118,7 +113,8 @@ struct Totals {
 };
 
 template <class Space> Totals totals(const Placed<Space, double> &at) {
-  const auto &[m, w, q, v, generalized] = at;
+  const auto &[w, q, v, generalized] = at;
+  const auto &m = w.m;
   Totals sum;
   Vector3d g = Vector3d::Zero();
   g.head(m.gravity.size()) = m.gravity;
@@ -135,26 +131,25 @@ template <class Space> Totals totals(const Placed<Space, double> &at) {
         0.5 * (u.dot(linear) + omega.dot(angular) + u.dot(body.S_p_dot) + omega.dot(body.h_p_dot)) + body.modal;
     for (int k = 0; k < node.n(); ++k)
       sum.strain += 0.5 * node.body.K[k] * p[k] * p[k];
-    const Eigen::Map<const Eigen::VectorXd> rates(p_dot, node.n());
+    const Map<const VectorXd> rates(p_dot, node.n());
     const auto &D = node.body.D_full;
-    sum.dissipated += D.size() ? rates.dot(D * rates)
-                               : rates.cwiseAbs2().dot(Eigen::Map<const Eigen::VectorXd>(node.body.D.data(), node.n()));
+    sum.dissipated +=
+        D.size() ? rates.dot(D * rates) : rates.cwiseAbs2().dot(Map<const VectorXd>(node.body.D.data(), node.n()));
     sum.gravitational -= g.dot(body.mass * r + R * body.s);
     sum.momentum += R * linear;
     sum.angular_momentum += R * angular + r.cross(R * linear);
     if (node.rotor_inertia > 0) {
       const double spin = w.hinges[i].spin;
       sum.kinetic += 0.5 * node.rotor_inertia * spin * spin;
-      sum.angular_momentum += node.rotor_turns * node.rotor_inertia * spin * outer_axes(m, i, w).col(2);
+      sum.angular_momentum += node.rotor_turns * node.rotor_inertia * spin * outer_axes(i, w).col(2);
     }
   }
   return sum;
 }
 
 template <class Space>
-Totals totals(const Mechanism<Space> &m, const Scene &scene, const double *q, const double *v,
-              Workspace<Space, double> &w) {
-  const Placed<Space, double> placed = place_all(m, q, v, nullptr, w);
+Totals totals(const Scene &scene, const double *q, const double *v, Workspace<Space, double> &w) {
+  const Placed<Space, double> placed = place_all(q, v, nullptr, w);
   Totals sum = totals(placed);
   for (const JointForce &joint : scene.joint_forces) {
     const double way = q[joint.q] - joint.rest, rate = v[joint.v];
@@ -175,42 +170,38 @@ Totals totals(const Mechanism<Space> &m, const Scene &scene, const double *q, co
 
 } // namespace
 
-template <class Space>
-RowMajor motions_of_states(const Mechanism<Space> &m, const RowMajor &q, const RowMajor &v,
-                           Workspace<Space, double> &w) {
-  RowMajor found(q.rows(), 18 * static_cast<Eigen::Index>(m.nodes.size() + m.wrenches.size()));
-  for (Eigen::Index i = 0; i < q.rows(); ++i) {
-    const Placed<Space, double> at = place_all(m, q.row(i).data(), v.row(i).data(), nullptr, w);
+template <class Space> RowMajor motions_of_states(const RowMajor &q, const RowMajor &v, Workspace<Space, double> &w) {
+  RowMajor found(q.rows(), 18 * static_cast<Index>(w.m.nodes.size() + w.m.wrenches.size()));
+  for (Index i = 0; i < q.rows(); ++i) {
+    const Placed<Space, double> at = place_all(q.row(i).data(), v.row(i).data(), nullptr, w);
     double *to = found.row(i).data();
     for (const Pose<double> &frame : w.frames)
       write_motion(frame, to), to += 18;
-    for (std::size_t k = 0; k < m.wrenches.size(); ++k, to += 18)
+    for (std::size_t k = 0; k < w.m.wrenches.size(); ++k, to += 18)
       write_motion(wrench_pose(at, static_cast<int>(k)), to);
   }
   return found;
 }
 
-template <class Space>
-RowMajor without_work(const Mechanism<Space> &m, const RowMajor &q, const RowMajor &forces,
-                      Workspace<Space, double> &w) {
+template <class Space> RowMajor without_work(const RowMajor &q, const RowMajor &forces, Workspace<Space, double> &w) {
   constexpr int d = Space::dim, linear = Space::linear;
-  const std::vector<double> still(m.n_v);
+  const std::vector<double> still(w.m.n_v);
   RowMajor found(forces.rows(), forces.cols());
-  for (Eigen::Index i = 0; i < q.rows(); ++i) {
-    place_all(m, q.row(i).data(), still.data(), nullptr, w);
-    for (std::size_t k = 0; k < m.nodes.size(); ++k) {
-      const Node<Space> &node = m.nodes[k];
-      Eigen::Matrix<double, d, d> axes = Eigen::Matrix<double, d, d>::Identity();
-      const Matrix3d R = outer_axes(m, k, w);
+  for (Index i = 0; i < q.rows(); ++i) {
+    place_all(q.row(i).data(), still.data(), nullptr, w);
+    for (std::size_t k = 0; k < w.m.nodes.size(); ++k) {
+      const Node<Space> &node = w.m.nodes[k];
+      Matrix<double, d, d> axes = Matrix<double, d, d>::Identity();
+      const Matrix3d R = outer_axes(k, w);
       axes.template topLeftCorner<linear, linear>() = R.topLeftCorner<linear, linear>();
       if constexpr (d == 6)
         axes.template bottomRightCorner<3, 3>() = R;
-      const Eigen::Index place = k * d;
-      Eigen::Matrix<double, d, 1> f = axes.transpose() * forces.row(i).segment<d>(place).transpose();
-      forces_to_freedoms(node, w.hinges[k], f.data());
+      const Index place = k * d;
+      Matrix<double, d, 1> f = axes.transpose() * forces.row(i).segment<d>(place).transpose();
+      forces_by_freedoms<1>(node, w.hinges[k], f.data());
       for (int c = 0; c < node.shape.freedoms.count; ++c)
         f[node.shape.freedoms.component[c]] = 0;
-      forces_from_freedoms(node, w.hinges[k], f.data());
+      forces_by_freedoms<-1>(node, w.hinges[k], f.data());
       found.row(i).segment<d>(place) = axes * f;
     }
   }
@@ -221,8 +212,8 @@ template <class Space>
 RowMajor totals_of_states(const Mechanism<Space> &m, const Scene &scene, const RowMajor &q, const RowMajor &v) {
   Workspace<Space, double> w(m);
   RowMajor found(q.rows(), 10);
-  for (Eigen::Index i = 0; i < q.rows(); ++i) {
-    const Totals sum = totals(m, scene, q.row(i).data(), v.row(i).data(), w);
+  for (Index i = 0; i < q.rows(); ++i) {
+    const Totals sum = totals(scene, q.row(i).data(), v.row(i).data(), w);
     found.row(i) << sum.kinetic, sum.strain, sum.gravitational, sum.dissipated, sum.momentum.transpose(),
         sum.angular_momentum.transpose();
   }
@@ -230,12 +221,9 @@ RowMajor totals_of_states(const Mechanism<Space> &m, const Scene &scene, const R
 }
 
 #define FFROBOT_INSTANTIATE(Space)                                                                                     \
-  template std::vector<FrameMotion> frame_motions(const Mechanism<Space> &, const double *, const double *,            \
-                                                  Workspace<Space, double> &);                                         \
-  template RowMajor motions_of_states(const Mechanism<Space> &, const RowMajor &, const RowMajor &,                    \
-                                      Workspace<Space, double> &);                                                     \
-  template RowMajor without_work(const Mechanism<Space> &, const RowMajor &, const RowMajor &,                         \
-                                 Workspace<Space, double> &);                                                          \
+  template std::vector<FrameMotion> frame_motions(const double *, const double *, Workspace<Space, double> &);         \
+  template RowMajor motions_of_states(const RowMajor &, const RowMajor &, Workspace<Space, double> &);                 \
+  template RowMajor without_work(const RowMajor &, const RowMajor &, Workspace<Space, double> &);                      \
   template RowMajor totals_of_states(const Mechanism<Space> &, const Scene &, const RowMajor &, const RowMajor &);
 FFROBOT_INSTANTIATE(Planar)
 FFROBOT_INSTANTIATE(Spatial)

@@ -1,7 +1,6 @@
 #include "core/recursion/inverse/prescribed_motion.h"
 
 #include "core/linear/products.h"
-#include "core/recursion/inverse/force_slopes.h"
 #include "core/recursion/motion/postures.h"
 
 #include <algorithm>
@@ -10,10 +9,6 @@
 #include <string>
 
 namespace ffrobot::recursion {
-
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
 ModalMotion modes_at(const std::vector<ModalShape> &shape, double t) {
   Index n = 0, k = 0;
@@ -80,12 +75,12 @@ template <class Space> void PrescribedMotion<Space>::set_modes(const ModalMotion
 }
 
 template <class Space> void PrescribedMotion<Space>::measure() {
-  recursion::measure(driven_.mechanism, q(), v(), w_, value_.data(), rate_.data());
+  recursion::measure(q(), v(), w_, value_.data(), rate_.data());
   take_off(targets_, driven_.mechanism.constraints, value_, rate_);
 }
 
 template <class Space> void PrescribedMotion<Space>::factorise() {
-  factors_.compute(gradients(driven_.mechanism, q(), w_)(Eigen::all, driven_.of_joints)); // C_J
+  factors_.compute(gradients(q(), w_)(Eigen::all, driven_.of_joints)); // C_J
 }
 
 template <class Space> void PrescribedMotion<Space>::go(double factor, const VectorXd &values) {
@@ -155,7 +150,7 @@ void PrescribedMotion<Space>::take_joints(double t, const ModalMotion &modes, co
 }
 
 template <class Space> std::vector<Jet> PrescribedMotion<Space>::measured_in(const PrescribedMotion &other) {
-  recursion::measure(driven_.mechanism, other.q(), other.v(), w_, value_.data(), rate_.data());
+  recursion::measure(other.q(), other.v(), w_, value_.data(), rate_.data());
   forces_.prepare(other.q(), other.v(), nullptr, w_);
   forces_.accelerate(other.q(), other.a_.data(), w_);
   std::vector<Jet> found;
@@ -235,7 +230,7 @@ Derivatives PrescribedMotion<Space>::derivatives_under(const VectorXd &forces, c
     target[r] = forces_.of_constraint(r, a_.data(), w_).value;
   w_.keep(active);
   const double t = std::clamp(time_, first_, last_);
-  return recursion::derivatives_under(driven_.mechanism, driven_.scene, t, state_, forces, target, w_);
+  return recursion::derivatives_under(driven_.scene, t, state_, forces, target, w_);
 }
 
 // With all constraint equations C_ddot stays what it is: its derivatives at given a are -C_v a_q and -C_v a_v. Rows of
@@ -243,7 +238,7 @@ Derivatives PrescribedMotion<Space>::derivatives_under(const VectorXd &forces, c
 template <class Space> JointSlopes PrescribedMotion<Space>::joint_slopes(const JointSlopes *followed) {
   VectorXd forces = VectorXd::Zero(a_.size());
   if (acting_.generalized)
-    forces += Eigen::Map<const VectorXd>(acting_.generalized, a_.size());
+    forces += Map<const VectorXd>(acting_.generalized, a_.size());
   forces(driven_.of_modes) += shape_force();
   const Derivatives found = derivatives_under(forces, motion_.workspace().active);
   const MatrixXd &C = found.value_q;
@@ -270,7 +265,7 @@ template <class Space> JointSlopes PrescribedMotion<Space>::joint_slopes(const J
 template <class Space> LeftSlopes PrescribedMotion<Space>::left_slopes(const JointSlopes &joints) {
   VectorXd forces = VectorXd::Zero(a_.size());
   if (acting_.generalized)
-    forces += Eigen::Map<const VectorXd>(acting_.generalized, a_.size());
+    forces += Map<const VectorXd>(acting_.generalized, a_.size());
   std::vector<int> active = motion_.workspace().active;
   if (const Motors<Space> *found = motors()) {
     forces(driven_.of_modes) += (found->left() - found->beside())(driven_.of_modes);

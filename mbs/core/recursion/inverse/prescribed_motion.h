@@ -8,7 +8,7 @@
 // go with them: lambda is the smallest then.
 #pragma once
 
-#include "core/recursion/constrained_aba/derivatives.h"
+#include "core/recursion/inverse/force_slopes.h"
 #include "core/recursion/inverse/motors.h"
 #include "core/recursion/motion/natural_sizes.h"
 
@@ -18,7 +18,7 @@ namespace ffrobot::recursion {
 
 // p, p_dot, p_ddot of all bodies, in the order of DrivenMechanism::of_modes
 struct ModalMotion {
-  Eigen::VectorXd p, p_dot, p_ddot;
+  VectorXd p, p_dot, p_ddot;
 };
 
 using ModalShape = std::vector<TimeFunction>; // p_k(t) of one body
@@ -27,11 +27,11 @@ ModalMotion modes_at(const std::vector<ModalShape> &shape, double t);
 // How the motion of all coordinates answers to small changes of p, p_dot and p_ddot, (n_v, modes) each. By p_dot v, and
 // by p_ddot a, change as q by p does.
 struct JointSlopes {
-  Eigen::MatrixXd q, v, a_p, a_v; // of q, v and a by p, of a by p_dot
+  MatrixXd q, v, a_p, a_v; // of q, v and a by p, of a by p_dot
 };
 
 struct LeftSlopes {
-  Eigen::MatrixXd M, D, K; // (modes + motors, modes) of what is left and of torques, by p_ddot, p_dot, p
+  MatrixXd M, D, K; // (modes + motors, modes) of what is left and of torques, by p_ddot, p_dot, p
 };
 
 template <class Space> class PrescribedMotion {
@@ -39,7 +39,7 @@ public:
   using TreeWorkspace = Workspace<Space, double>;
 
   // Throws std::invalid_argument where constraint equations are fewer than coordinates of joints.
-  PrescribedMotion(DrivenMechanism<Space> driven, const Eigen::VectorXd &q);
+  PrescribedMotion(DrivenMechanism<Space> driven, const VectorXd &q);
   PrescribedMotion(const PrescribedMotion &) = delete;
   virtual ~PrescribedMotion() = default;
 
@@ -47,28 +47,28 @@ public:
   void hold_loads(double from, double until) { first_ = from, last_ = until; }
 
   // The next position is found from the joints of q (n_q), without looking at the last one.
-  virtual void start_at(const Eigen::VectorXd &q);
+  virtual void start_at(const VectorXd &q);
 
   // The joints' motion at time t for these modes; false where no position is found. From the last position, along its
   // velocity, or from where it starts.
   virtual bool move(double t, const ModalMotion &modes);
   void balance(); // then: the forces of that motion
 
-  const Eigen::VectorXd &state() const { return state_; } // (q, v)
+  const VectorXd &state() const { return state_; } // (q, v)
   const double *q() const { return state_.data(); }
   const double *v() const { return state_.data() + driven_.mechanism.n_q; }
-  const Eigen::VectorXd &a() const { return a_; }               // (n_v)
-  const Eigen::VectorXd &lambda() const { return lambda_; }     // (constraint equations)
-  const Eigen::VectorXd &required() const { return required_; } // (n_v) f
-  Eigen::VectorXd shape_force() const;                          // (modes)
+  const VectorXd &a() const { return a_; }               // (n_v)
+  const VectorXd &lambda() const { return lambda_; }     // (constraint equations)
+  const VectorXd &required() const { return required_; } // (n_v) f
+  VectorXd shape_force() const;                          // (modes)
   const Motors<Space> *motors(); // in place of all that is required along joints; null where there are none
-  Eigen::VectorXd left();        // (modes) that motors, or without any the constraint equations, leave
+  VectorXd left();               // (modes) that motors, or without any the constraint equations, leave
   // After balance(), as the next ones; then comes the next move(). Coordinates that are a path, if any, change as in
   // `followed`.
   JointSlopes joint_slopes(const JointSlopes *followed = nullptr);
   virtual LeftSlopes slopes() { return left_slopes(joint_slopes()); } // of left() and of motors along joints; exact
   const DrivenMechanism<Space> &driven() const { return driven_; }
-  Eigen::Index modes() const { return driven_.of_modes.size(); }
+  Index modes() const { return driven_.of_modes.size(); }
 
   TreeWorkspace &workspace() { return w_; } // with kinematics, accelerations of frames, multipliers
 
@@ -81,13 +81,13 @@ protected:
   std::vector<Jet> measured_in(const PrescribedMotion &other);
 
 private:
-  Derivatives derivatives_under(const Eigen::VectorXd &forces, const std::vector<int> &active);
+  Derivatives derivatives_under(const VectorXd &forces, const std::vector<int> &active);
   void set_modes(const ModalMotion &modes);
   void act(double t); // at the state that was measured
   bool find_position();
   void measure();
   void factorise();
-  void go(double factor, const Eigen::VectorXd &values); // joints in q
+  void go(double factor, const VectorXd &values); // joints in q
 
   const DrivenMechanism<Space> driven_;
   const ConfigurationSpace space_;
@@ -99,8 +99,8 @@ private:
   std::optional<Motors<Space>> motors_;
   std::vector<int> modes_in_q_, angles_; // of of_modes; of of_joints, by numbers there
   std::vector<Jet> targets_;
-  Eigen::VectorXd state_, a_, lambda_, required_, f_, value_, rate_;
-  Eigen::VectorXd Q_, step_; // (n_v), (n_v) zero along modes
+  VectorXd state_, a_, lambda_, required_, f_, value_, rate_;
+  VectorXd Q_, step_; // (n_v), (n_v) zero along modes
   LeastNorm factors_;
   double time_ = 0, first_, last_;
   bool goes_on_ = false;
@@ -112,10 +112,10 @@ private:
 template <class Space> class RedefinedMotion final : public PrescribedMotion<Space> {
 public:
   // offset: one function for each mode of all bodies, or none.
-  RedefinedMotion(DrivenMechanism<Space> driven, DrivenMechanism<Space> path, const Eigen::VectorXd &q, double factor,
+  RedefinedMotion(DrivenMechanism<Space> driven, DrivenMechanism<Space> path, const VectorXd &q, double factor,
                   std::vector<TimeFunction> offset);
 
-  void start_at(const Eigen::VectorXd &q) override { path_.start_at(q); }
+  void start_at(const VectorXd &q) override { path_.start_at(q); }
   LeftSlopes slopes() override;
   bool move(double t, const ModalMotion &modes) override;
 

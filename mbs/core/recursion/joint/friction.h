@@ -1,6 +1,7 @@
 // Friction along a coordinate.
 #pragma once
 
+#include "core/fields.h"
 #include <cmath>
 
 namespace ffrobot {
@@ -18,6 +19,8 @@ struct Friction {
     return viscous + coulomb / (speed * steady * steady);
   }
   bool acts() const { return viscous != 0 || coulomb != 0; }
+
+  FFROBOT_FIELDS(viscous, coulomb, speed);
 };
 
 } // namespace ffrobot

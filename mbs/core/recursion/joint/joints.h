@@ -60,9 +60,7 @@ struct Universal {
     sine_and_cosine(q[0], sa, ca);
     sine_and_cosine(q[1], sb, cb);
     const T zero(0.), R[3][3] = {{cb, zero, sb}, {sa * sb, ca, -(sa * cb)}, {-(ca * sb), sa, ca * cb}};
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j)
-        to.R[i][j] = R[i][j];
+    assign(R, to.R);
     to.w[0] = cb * v[0], to.w[1] = v[1], to.w[2] = sb * v[0];
     to.w_dot[0] = -(sb * v[0] * v[1]), to.w_dot[2] = cb * v[0] * v[1];
   }

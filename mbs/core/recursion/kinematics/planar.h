@@ -13,12 +13,11 @@ template <class T> FFROBOT_INLINE T section_angle(const planar::Body &b, int por
 }
 
 template <class T>
-FFROBOT_NOINLINE void kinematics(const Mechanism<Planar> &m, const T *q, const T *v, const Forces<T> &forces,
-                                 Workspace<Planar, T> &w) {
+FFROBOT_NOINLINE void kinematics(const T *q, const T *v, const Forces<T> &forces, Workspace<Planar, T> &w) {
   const std::size_t count = w.hinges.size();
   Angles<T> angles;
   for (std::size_t i = 0; i < count; ++i) {
-    const Node<Planar> &node = m.nodes[i];
+    const Node<Planar> &node = w.m.nodes[i];
     planar::State<T> &s = w.bodies[i];
     project(node.body, q + node.p_q(), v + node.p_v(), forces.generalized ? forces.generalized + node.p_v() : nullptr,
             s);
@@ -34,7 +33,7 @@ FFROBOT_NOINLINE void kinematics(const Mechanism<Planar> &m, const T *q, const T
     angles.take(i, count, angle, w.sine.data(), w.cosine.data());
   }
   for (std::size_t i = 0; i < count; ++i) {
-    const Node<Planar> &node = m.nodes[i];
+    const Node<Planar> &node = w.m.nodes[i];
     planar::State<T> &s = w.bodies[i];
     Hinge<Planar, T> &hinge = w.hinges[i];
     const T cosine = w.cosine[i], sine = w.sine[i];
@@ -146,17 +145,13 @@ FFROBOT_INLINE void port_to_global(const planar::Body &, int, const planar::Stat
   PlanarTurn<T>{s.absolute_cosine, s.absolute_sine}.apply(x, y);
 }
 
-// Lift an acceleration from unit freedoms of the outer section to the rates of joint coordinates, and the reverse for
-// forces: translations along inner axes
-template <class T> FFROBOT_INLINE void to_inner_axes(const Node<Planar> &, const T *q, const T *x, T *y) {
+// Accelerations from unit freedoms of the outer section to the rates of joint coordinates, whose translations are along
+// inner axes, and forces back: to axes of the inner section, or of the outer one
+template <bool to_inner, class T>
+FFROBOT_INLINE void change_section(const Node<Planar> &, const T *q, const T *x, T *y) {
   T s, c;
   sine_and_cosine(q[2], s, c);
-  PlanarTurn<T>{c, s}.apply(x, y);
-}
-template <class T> FFROBOT_INLINE void to_outer_axes(const Node<Planar> &, const T *q, const T *x, T *y) {
-  T s, c;
-  sine_and_cosine(q[2], s, c);
-  PlanarTurn<T>{c, s}.back(x, y);
+  PlanarTurn<T>{c, to_inner ? s : -s}.apply(x, y);
 }
 
 } // namespace ffrobot::recursion

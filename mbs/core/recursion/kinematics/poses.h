@@ -15,11 +15,7 @@ template <class T> FFROBOT_INLINE void ground_motion(const PlanarMarker &marker,
   to.angle = T(marker.angle);
 }
 template <class T> FFROBOT_INLINE void ground_axes(const PlanarMarker &marker, Pose<T> &to) {
-  const double c = std::cos(marker.angle), s = std::sin(marker.angle);
-  const double R[3][3] = {{c, -s, 0}, {s, c, 0}, {0, 0, 1}};
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      to.R[i][j] = T(R[i][j]);
+  assign_turn_about_z(T(std::cos(marker.angle)), T(std::sin(marker.angle)), to.R);
 }
 template <class T> FFROBOT_INLINE void ground_motion(const SpatialMarker &marker, Pose<T> &to) {
   for (int i = 0; i < 3; ++i)
@@ -27,9 +23,7 @@ template <class T> FFROBOT_INLINE void ground_motion(const SpatialMarker &marker
   to.angle = T(0.);
 }
 template <class T> FFROBOT_INLINE void ground_axes(const SpatialMarker &marker, Pose<T> &to) {
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      to.R[i][j] = T(marker.triad(i, j));
+  assign(marker.triad, to.R);
 }
 
 // Of a section of a body whose frame is known
@@ -50,10 +44,7 @@ template <class T>
 inline void section_axes(const planar::Body &, int, const planar::State<T> &, Pose<T> &to) { // after section_motion()
   T sine, cosine;
   sine_and_cosine(to.angle, sine, cosine);
-  const T R[3][3] = {{cosine, -sine, T(0.)}, {sine, cosine, T(0.)}, {T(0.), T(0.), T(1.)}};
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      to.R[i][j] = R[i][j];
+  assign_turn_about_z(cosine, sine, to.R);
 }
 template <class T>
 inline void section_motion(const spatial::Body &body, int port, const spatial::State<T> &s, const Pose<T> &frame,
@@ -83,13 +74,8 @@ template <class T>
 inline void section_axes(const spatial::Body &body, int port, const spatial::State<T> &s, Pose<T> &to) {
   const spatial::Port &constants = body.ports[port];
   product(s.absolute, constants.R, to.R);
-  if (constants.is_flexible) {
-    T axes[3][3];
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j)
-        axes[i][j] = to.R[i][j];
-    product(axes, s.ports[port].turn, to.R);
-  }
+  if (constants.is_flexible)
+    product(to.R, s.ports[port].turn, to.R);
 }
 template <class Body, class State, class T>
 inline void section_pose(const Body &body, int port, const State &s, const Pose<T> &frame, Pose<T> &to) {
@@ -97,19 +83,12 @@ inline void section_pose(const Body &body, int port, const State &s, const Pose<
 }
 
 template <class T> FFROBOT_INLINE void frame_axes(const planar::State<T> &s, Pose<T> &to) {
-  const T c = s.absolute_cosine, n = s.absolute_sine;
-  const T R[3][3] = {{c, -n, T(0.)}, {n, c, T(0.)}, {T(0.), T(0.), T(1.)}};
-  for (int i = 0; i < 3; ++i) {
-    to.omega[i] = i == 2 ? s.omega : T(0.);
-    for (int j = 0; j < 3; ++j)
-      to.R[i][j] = R[i][j];
-  }
+  to.omega[0] = to.omega[1] = T(0.), to.omega[2] = s.omega;
+  assign_turn_about_z(s.absolute_cosine, s.absolute_sine, to.R);
 }
 template <class T> FFROBOT_INLINE void frame_axes(const spatial::State<T> &s, Pose<T> &to) {
   turn(s.absolute, s.omega, to.omega);
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      to.R[i][j] = s.absolute[i][j];
+  assign(s.absolute, to.R);
 }
 
 template <class T> FFROBOT_INLINE T joint_angle(const Node<Planar> &node, const T *q, const planar::State<T> &s) {
@@ -122,16 +101,15 @@ template <class T> FFROBOT_INLINE T joint_angle(const Node<Spatial> &, const T *
 }
 
 // Of all frames: w.frames
-template <class Space, class T>
-FFROBOT_NOINLINE void locate(const Mechanism<Space> &m, const T *q, Workspace<Space, T> &w) {
-  for (std::size_t i = 0; i < m.nodes.size(); ++i) {
-    const Node<Space> &node = m.nodes[i];
+template <class Space, class T> FFROBOT_NOINLINE void locate(const T *q, Workspace<Space, T> &w) {
+  for (std::size_t i = 0; i < w.m.nodes.size(); ++i) {
+    const Node<Space> &node = w.m.nodes[i];
     const Hinge<Space, T> &hinge = w.hinges[i];
     Pose<T> inner, at{};
     if (node.parent < 0)
-      ground_motion(m.ground[node.parent_port], inner);
+      ground_motion(w.m.ground[node.parent_port], inner);
     else
-      section_motion(m.nodes[node.parent].body, node.parent_port - m.nodes[node.parent].first_port,
+      section_motion(w.m.nodes[node.parent].body, node.parent_port - w.m.nodes[node.parent].first_port,
                      w.bodies[node.parent], w.frames[node.parent], inner);
     Pose<T> &frame = w.frames[i];
     frame_axes(w.bodies[i], frame);
@@ -151,7 +129,7 @@ FFROBOT_NOINLINE void locate(const Mechanism<Space> &m, const T *q, Workspace<Sp
         frame.angle -= tilt;
         T s, c;
         sine_and_cosine(frame.angle + tilt, s, c);
-        section.R[0][0] = c, section.R[0][1] = -s, section.R[1][0] = s, section.R[1][1] = c;
+        assign_turn_about_z(c, s, section.R);
       }
     }
     for (int k = 0; k < Space::linear; ++k)
@@ -166,29 +144,25 @@ FFROBOT_NOINLINE void locate(const Mechanism<Space> &m, const T *q, Workspace<Sp
 }
 
 template <class Space, class T>
-FFROBOT_INLINE void attachment_motion(const Mechanism<Space> &m, const Attachment &at, const Workspace<Space, T> &w,
-                                      Pose<T> &to) {
+FFROBOT_INLINE void attachment_motion(const Attachment &at, const Workspace<Space, T> &w, Pose<T> &to) {
   if (at.node >= 0)
-    return section_motion(m.nodes[at.node].body, at.port, w.bodies[at.node], w.frames[at.node], to);
-  ground_motion(m.ground[at.port], to);
+    return section_motion(w.m.nodes[at.node].body, at.port, w.bodies[at.node], w.frames[at.node], to);
+  ground_motion(w.m.ground[at.port], to);
   if constexpr (Space::dim == 6)
-    if (m.ground[at.port].turns)
+    if (w.m.ground[at.port].turns)
       for (int i = 0; i < 3; ++i)
         to.omega[i] = T(w.turning[at.port].omega[i]);
 }
 
 template <class Space, class T>
-FFROBOT_INLINE void attachment_pose(const Mechanism<Space> &m, const Attachment &at, const Workspace<Space, T> &w,
-                                    Pose<T> &to) {
-  attachment_motion(m, at, w, to);
+FFROBOT_INLINE void attachment_pose(const Attachment &at, const Workspace<Space, T> &w, Pose<T> &to) {
+  attachment_motion(at, w, to);
   if (at.node >= 0)
-    return section_axes(m.nodes[at.node].body, at.port, w.bodies[at.node], to);
-  ground_axes(m.ground[at.port], to);
+    return section_axes(w.m.nodes[at.node].body, at.port, w.bodies[at.node], to);
+  ground_axes(w.m.ground[at.port], to);
   if constexpr (Space::dim == 6)
-    if (m.ground[at.port].turns)
-      for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j)
-          to.R[i][j] = T(w.turning[at.port].A(i, j));
+    if (w.m.ground[at.port].turns)
+      assign(w.turning[at.port].A, to.R);
 }
 
 } // namespace ffrobot::recursion

@@ -15,19 +15,13 @@ template <class T> struct InnerSection {
 };
 
 template <class T>
-FFROBOT_INLINE void inner_section(const Mechanism<Spatial> &m, const Node<Spatial> &node, Workspace<Spatial, T> &w,
-                                  InnerSection<T> &to) {
+FFROBOT_INLINE void inner_section(const Node<Spatial> &node, Workspace<Spatial, T> &w, InnerSection<T> &to) {
   to.tilt = nullptr;
   if (node.parent < 0) {
-    const Eigen::Matrix3d &triad = m.ground[node.parent_port].triad;
-    for (int i = 0; i < 3; ++i) {
-      to.omega[i] = T(0.);
-      for (int j = 0; j < 3; ++j)
-        to.axes[i][j] = T(triad(i, j));
-    }
-    return;
+    to.omega[0] = to.omega[1] = to.omega[2] = T(0.);
+    return assign(w.m.ground[node.parent_port].triad, to.axes);
   }
-  const Node<Spatial> &parent = m.nodes[node.parent];
+  const Node<Spatial> &parent = w.m.nodes[node.parent];
   const State<T> &p = w.bodies[node.parent];
   const int port = node.parent_port - parent.first_port;
   turn_back(parent.body.ports[port].R, p.omega, to.omega);
@@ -49,10 +43,8 @@ FFROBOT_INLINE void turn_revolute(const InnerSection<T> &inner, const T &s, cons
       R[i][0] = c * inner.tilt[i][0] + s * inner.tilt[i][1], R[i][1] = c * inner.tilt[i][1] - s * inner.tilt[i][0];
       R[i][2] = inner.tilt[i][2];
     }
-  else {
-    R[0][0] = c, R[0][1] = -s, R[1][0] = s, R[1][1] = c, R[2][2] = T(1.);
-    R[0][2] = R[1][2] = R[2][0] = R[2][1] = T(0.);
-  }
+  else
+    assign_turn_about_z(c, s, R);
   turn_back(R, inner.omega, omega);
   hinge.c[3] = omega[1] * v, hinge.c[4] = -(omega[0] * v);
   omega[2] += v;
@@ -72,16 +64,10 @@ inline void turn_any(const Node<Spatial> &node, const InnerSection<T> &inner, co
                      Hinge<Spatial, T> &hinge, T *omega) {
   SpatialPlace<T> to;
   place(node.joint, node.lead, q, v, to);
-  if (inner.tilt) {
-    T tilt[3][3];
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j)
-        tilt[i][j] = inner.tilt[i][j];
-    product(tilt, to.R, hinge.turn.R);
-  } else
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j)
-        hinge.turn.R[i][j] = to.R[i][j];
+  if (inner.tilt)
+    product(inner.tilt, to.R, hinge.turn.R);
+  else
+    assign(to.R, hinge.turn.R);
   hinge.cross_cosine = to.R[0][0], hinge.cross_sine = to.R[0][2];
   T o[3], or_[3], oor[3], or_dot[3], ow[3];
   turn_back(hinge.turn.R, inner.omega, o);
@@ -112,21 +98,20 @@ template <class T> FFROBOT_INLINE void force_columns(const Node<Spatial> &node, 
 } // namespace spatial
 
 template <class T>
-FFROBOT_NOINLINE void kinematics(const Mechanism<Spatial> &m, const T *q, const T *v, const Forces<T> &forces,
-                                 Workspace<Spatial, T> &w) {
+FFROBOT_NOINLINE void kinematics(const T *q, const T *v, const Forces<T> &forces, Workspace<Spatial, T> &w) {
   Angles<T> angles;
-  for (std::size_t i = 0; i < m.nodes.size(); ++i) {
-    const bool turns = m.nodes[i].joint == JointKind::revolute;
-    angles.take(i, m.nodes.size(), turns ? q[m.nodes[i].q] : T(0.), w.sine.data(), w.cosine.data());
+  for (std::size_t i = 0; i < w.m.nodes.size(); ++i) {
+    const bool turns = w.m.nodes[i].joint == JointKind::revolute;
+    angles.take(i, w.m.nodes.size(), turns ? q[w.m.nodes[i].q] : T(0.), w.sine.data(), w.cosine.data());
   }
-  for (std::size_t i = 0; i < m.nodes.size(); ++i) {
-    const Node<Spatial> &node = m.nodes[i];
+  for (std::size_t i = 0; i < w.m.nodes.size(); ++i) {
+    const Node<Spatial> &node = w.m.nodes[i];
     spatial::State<T> &s = w.bodies[i];
     Hinge<Spatial, T> &hinge = w.hinges[i];
     project(node.body, q + node.p_q(), v + node.p_v(), forces.generalized ? forces.generalized + node.p_v() : nullptr,
             s);
     spatial::InnerSection<T> inner;
-    spatial::inner_section(m, node, w, inner);
+    spatial::inner_section(node, w, inner);
     if (node.joint == JointKind::revolute)
       spatial::turn_revolute(inner, w.sine[i], w.cosine[i], v[node.v], hinge, s.omega);
     else
@@ -137,22 +122,13 @@ FFROBOT_NOINLINE void kinematics(const Mechanism<Spatial> &m, const T *q, const 
     product(inner.axes, hinge.turn.R, s.absolute);
     if (node.inboard >= 0) { // from the section to the frame
       const spatial::PortMotion<T> &port = s.ports[node.inboard];
-      T undeformed[3], axes[3][3], turned[3][3];
+      T undeformed[3];
       turn(port.turn, s.omega, undeformed);
       for (int k = 0; k < 3; ++k)
         undeformed[k] -= port.rate[k];
       turn(node.body.ports[node.inboard].R, undeformed, s.omega);
-      for (int k = 0; k < 3; ++k)
-        for (int l = 0; l < 3; ++l)
-          axes[k][l] = s.absolute[k][l], turned[k][l] = T(0.);
-      const auto &R = node.body.ports[node.inboard].R;
-      for (int k = 0; k < 3; ++k)
-        for (int l = 0; l < 3; ++l)
-          for (int j = 0; j < 3; ++j)
-            turned[k][l] += axes[k][j] * port.turn[l][j];
-      for (int k = 0; k < 3; ++k)
-        for (int l = 0; l < 3; ++l)
-          s.absolute[k][l] = turned[k][0] * R[l][0] + turned[k][1] * R[l][1] + turned[k][2] * R[l][2];
+      for (T(&axis)[3] : s.absolute)
+        turn(port.turn, axis, axis), turn(node.body.ports[node.inboard].R, axis, axis);
     }
     for (int k = 0; k < node.ports(); ++k)
       spatial::place_port(node.body, k, s);
@@ -162,9 +138,7 @@ FFROBOT_NOINLINE void kinematics(const Mechanism<Spatial> &m, const T *q, const 
 // Undeformed axes of the inboard port by those of the section there
 template <class T> FFROBOT_INLINE SpatialTurn<T> inboard_tilt(const Node<Spatial> &node, const spatial::State<T> &s) {
   SpatialTurn<T> to;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      to.R[i][j] = s.ports[node.inboard].turn[i][j];
+  assign(s.ports[node.inboard].turn, to.R);
   return to;
 }
 
@@ -181,7 +155,7 @@ FFROBOT_NOINLINE void modes(const Node<Spatial> &node, const T *, T *z, spatial:
 }
 
 template <class T> FFROBOT_INLINE void ground_acceleration(const Mechanism<Spatial> &m, int marker, T *A) {
-  const Eigen::Vector3d g = m.ground[marker].triad.transpose() * m.gravity;
+  const Vector3d g = m.ground[marker].triad.transpose() * m.gravity;
   for (int i = 0; i < 3; ++i)
     A[i] = T(-g[i]), A[3 + i] = T(0.);
 }
@@ -195,19 +169,12 @@ FFROBOT_INLINE void port_to_global(const spatial::Body &b, int port, const spati
 }
 
 // As in the plane; x, y (6): translations
-template <class T> FFROBOT_INLINE void to_inner_axes(const Node<Spatial> &node, const T *q, const T *x, T *y) {
+template <bool to_inner, class T>
+FFROBOT_INLINE void change_section(const Node<Spatial> &node, const T *q, const T *x, T *y) {
   SpatialPlace<T> to;
   const T zero[6] = {T(0.), T(0.), T(0.), T(0.), T(0.), T(0.)};
   place(node.joint, node.lead, q, zero, to);
-  turn(to.R, x, y);
-  for (int i = 3; i < 6; ++i)
-    y[i] = x[i];
-}
-template <class T> FFROBOT_INLINE void to_outer_axes(const Node<Spatial> &node, const T *q, const T *x, T *y) {
-  SpatialPlace<T> to;
-  const T zero[6] = {T(0.), T(0.), T(0.), T(0.), T(0.), T(0.)};
-  place(node.joint, node.lead, q, zero, to);
-  turn_back(to.R, x, y);
+  to_inner ? turn(to.R, x, y) : turn_back(to.R, x, y);
   for (int i = 3; i < 6; ++i)
     y[i] = x[i];
 }

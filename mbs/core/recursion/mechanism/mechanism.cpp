@@ -13,18 +13,16 @@ namespace ffrobot::recursion {
 
 namespace {
 
-using Eigen::Index;
-
 [[noreturn]] void refuse(const std::string &text) { throw std::invalid_argument(text); }
 
 // Of the modes at a marker, rows along its own axes
-Eigen::MatrixXd section_rows(const PlanarMarker &marker) {
-  Eigen::MatrixXd rows = marker.Phi;
+MatrixXd section_rows(const PlanarMarker &marker) {
+  MatrixXd rows = marker.Phi;
   rows.topRows<2>() = Eigen::Rotation2D<double>(-marker.angle).toRotationMatrix() * marker.Phi.topRows<2>();
   return rows;
 }
-Eigen::MatrixXd section_rows(const SpatialMarker &marker) {
-  Eigen::MatrixXd rows = marker.Phi;
+MatrixXd section_rows(const SpatialMarker &marker) {
+  MatrixXd rows = marker.Phi;
   rows.topRows<3>() = marker.triad.transpose() * marker.Phi.topRows<3>();
   rows.bottomRows<3>() = marker.triad.transpose() * marker.Phi.bottomRows<3>();
   return rows;
@@ -35,7 +33,7 @@ bool is_curved(const PlanarData &data, const PlanarMarker &marker, int row) {
   return planar::is_curved(data, marker, row);
 }
 bool is_curved(const SpatialData &data, const SpatialMarker &marker, int row) {
-  const std::vector<Eigen::MatrixXd> K = spatial::section_K(marker);
+  const std::vector<MatrixXd> K = spatial::section_K(marker);
   return !K.empty() && K[row].cwiseAbs().maxCoeff() > spatial::negligible_K(data);
 }
 
@@ -45,11 +43,11 @@ SpatialData at_marker(const SpatialData &data, const SpatialMarker &m) {
 }
 
 // Of the body's data, where its frame is at a marker: in axes of that
-Eigen::Vector3d origin_from(const PlanarMarker &m) {
-  const Eigen::Vector2d x = -(Eigen::Rotation2D<double>(-m.angle) * m.position);
+Vector3d origin_from(const PlanarMarker &m) {
+  const Vector2d x = -(Eigen::Rotation2D<double>(-m.angle) * m.position);
   return {x[0], x[1], 0};
 }
-Eigen::Vector3d origin_from(const SpatialMarker &m) { return -(m.triad.transpose() * m.position); }
+Vector3d origin_from(const SpatialMarker &m) { return -(m.triad.transpose() * m.position); }
 
 // Of its axes in those of the body, in the plane
 double turn_of(const PlanarMarker &m) { return m.angle; }
@@ -62,7 +60,7 @@ bool frame_sits_at_joint(const BodyModel<typename Space::Data> &body, const Join
   if (body.data.modes() == 0)
     return true;
   const auto &marker = body.data.markers[body.inboard_marker];
-  const Eigen::MatrixXd rows = section_rows(marker);
+  const MatrixXd rows = section_rows(marker);
   for (int c = 0; c < Space::dim; ++c) {
     const int *first = shape.freedoms.component;
     const bool is_free = std::find(first, first + shape.freedoms.count, c) != first + shape.freedoms.count;
@@ -77,10 +75,9 @@ bool frame_sits_at_joint(const BodyModel<typename Space::Data> &body, const Join
 }
 
 // `count` matrices over the modes
-void check_K(const std::string &name, const char *key, const std::vector<Eigen::MatrixXd> &all, std::size_t count,
-             Index n) {
+void check_K(const std::string &name, const char *key, const std::vector<MatrixXd> &all, std::size_t count, Index n) {
   bool fits = all.size() == count;
-  for (const Eigen::MatrixXd &K : all)
+  for (const MatrixXd &K : all)
     fits = fits && K.rows() == n && K.cols() == n;
   if (!fits)
     refuse(name + ": " + key + ": expected " + std::to_string(count) + " matrices (" + std::to_string(n) + ", " +
@@ -138,8 +135,7 @@ template <class Space> struct Mechanism<Space>::Plan {
 
 template <class Space>
 Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Marker> ground_,
-                            std::vector<ConstraintModel> models, std::vector<MarkerAt> loaded,
-                            const Eigen::VectorXd &gravity_)
+                            std::vector<ConstraintModel> models, std::vector<MarkerAt> loaded, const VectorXd &gravity_)
     : ground(std::move(ground_)), gravity(gravity_) {
   if (gravity.size() != Space::linear)
     refuse("gravity: expected " + std::to_string(Space::linear) + " components, got " + std::to_string(gravity.size()));
@@ -355,7 +351,7 @@ template <class Space> void Mechanism<Space>::collect_actions() {
       for (std::size_t r = 0; r < constraints.size(); ++r)
         for (const double sign : {1., -1.})
           if (const Constraint &of = constraints[r]; (sign > 0 ? of.b : of.a).global_port == port) {
-            const Eigen::Vector3d f = sign * of.model.f;
+            const Vector3d f = sign * of.model.f;
             const bool is_point = of.model.kind == ConstraintKind::point;
             found.list.push_back({static_cast<int>(r), -1, sign, is_point, {f[0], f[1], f[2]}});
           }

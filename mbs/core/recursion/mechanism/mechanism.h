@@ -5,7 +5,7 @@
 
 #include "core/recursion/mechanism/space.h"
 
-#include <Eigen/Core>
+#include "core/eigen.h"
 
 #include <cmath>
 
@@ -45,8 +45,8 @@ template <class Space> struct Node {
   bool has_constraints = false;    // constraint equations that are coordinates of the joint
   bool is_single_grounded = false; // on the ground, without a child: forces on the ground are kept (Hinge::f)
   bool is_weightless = false;      // a rotor's inertia alone and no child: what carries it feels no inertia
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero(); // of the body's data, in axes of the frame
-  double turn = 0;                                  // in the plane: of the frame's axes in those of the body's data
+  Vector3d origin = Vector3d::Zero(); // of the body's data, in axes of the frame
+  double turn = 0;                    // in the plane: of the frame's axes in those of the body's data
 
   // Evaluations do not read these
   std::string name;
@@ -101,13 +101,13 @@ template <class Space> struct Mechanism {
 
   // Throws std::invalid_argument with what was expected and found.
   Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Marker> ground, std::vector<ConstraintModel> constraints,
-            std::vector<MarkerAt> wrenches, const Eigen::VectorXd &gravity);
+            std::vector<MarkerAt> wrenches, const VectorXd &gravity);
 
   std::vector<Node<Space>> nodes;
   std::vector<Marker> ground;
   std::vector<Constraint> constraints;
   std::vector<Attachment> wrenches; // markers on which forces act
-  Eigen::VectorXd gravity;          // (linear) m/s^2
+  VectorXd gravity;                 // (linear) m/s^2
   int n_q = 0, n_v = 0, ports = 0, slots = 0, crosses = 0;
   std::vector<int> children; // of each port: its child, or -1
   std::vector<char> cleared; // of each port: what acts on it is summed up, and starts at zero
@@ -119,7 +119,7 @@ template <class Space> struct Mechanism {
   std::vector<Actions> actions;
   bool needs_positions = false;        // constraint equations have directions that move
   bool has_moving_constraints = false; // or follow markers of the ground that turn
-  std::vector<Eigen::Index> rotations; // index in v of the first of three components of each quaternion's rate
+  std::vector<Index> rotations;        // index in v of the first of three components of each quaternion's rate
 
 private:
   // Phases of the constructor, in their order

@@ -8,9 +8,6 @@
 
 namespace ffrobot::recursion {
 
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-
 namespace {
 
 struct Components {
@@ -23,7 +20,7 @@ Matrix3d about(int axis, double angle) { return Eigen::AngleAxisd(angle, Vector3
 
 // A = exp(psi~), omega = J_l psi_dot, alpha = J_l psi_ddot + (dJ_l/dt) psi_dot: as the section of a port turns
 Turning by_vector(const Components &psi) {
-  using Axes = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>;
+  using Axes = Map<const Matrix<double, 3, 3, Eigen::RowMajor>>;
   spatial::PortMotion<double> section;
   std::copy_n(psi.x.data(), 3, section.phi), std::copy_n(psi.rate.data(), 3, section.phi_dot);
   turn_section(section);

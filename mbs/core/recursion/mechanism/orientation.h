@@ -3,7 +3,7 @@
 
 #include "core/time_function/time_function.h"
 
-#include <Eigen/Core>
+#include "core/eigen.h"
 
 #include <array>
 
@@ -11,8 +11,8 @@ namespace ffrobot::recursion {
 
 // A triad that turns, global axes: columns of A, rad/s, rad/s^2.
 struct Turning {
-  Eigen::Matrix3d A = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d omega = Eigen::Vector3d::Zero(), alpha = Eigen::Vector3d::Zero();
+  Matrix3d A = Matrix3d::Identity();
+  Vector3d omega = Vector3d::Zero(), alpha = Vector3d::Zero();
 };
 
 enum class OrientationKind {
@@ -24,7 +24,7 @@ enum class OrientationKind {
 struct OrientationLaw {
   OrientationKind kind = OrientationKind::rotation_vector;
   std::array<TimeFunction, 3> functions{Constant(0), Constant(0), Constant(0)};
-  Eigen::Matrix3d reference = Eigen::Matrix3d::Identity();
+  Matrix3d reference = Matrix3d::Identity();
 
   Turning operator()(double t) const;
 };

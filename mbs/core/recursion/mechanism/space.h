@@ -48,7 +48,7 @@ struct Planar {
   using Data = PlanarData;
   using Marker = PlanarMarker;
   using Body = planar::Body;
-  using Vector = Eigen::Vector2d;
+  using Vector = Vector2d;
   template <class T> using State = planar::State<T>;
   template <class T> using Turn = PlanarTurn<T>;
   static JointShape shape(JointKind kind) { return planar_shape(kind); }
@@ -59,7 +59,7 @@ struct Spatial {
   using Data = SpatialData;
   using Marker = SpatialMarker;
   using Body = spatial::Body;
-  using Vector = Eigen::Vector3d;
+  using Vector = Vector3d;
   template <class T> using State = spatial::State<T>;
   template <class T> using Turn = SpatialTurn<T>;
   static JointShape shape(JointKind kind) { return spatial_shape(kind); }

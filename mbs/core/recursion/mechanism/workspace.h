@@ -72,8 +72,9 @@ template <class T> struct Pose {
 
 template <class Space, class T> struct Workspace {
   static constexpr int d = Space::dim;
-  explicit Workspace(const Mechanism<Space> &m);
+  explicit Workspace(const Mechanism<Space> &m); // which must outlive this
 
+  const Mechanism<Space> &m;
   int columns; // one of column_counts
   std::vector<typename Space::template State<T>> bodies;
   std::vector<Hinge<Space, T>> hinges;
@@ -126,15 +127,13 @@ template <class T> struct Forces {
 // A state under generalized forces (as in Forces; may be null) whose kinematics the workspace has, with frames in
 // w.frames. Whatever asks where sections are takes one of these; it holds until w is used for another state.
 template <class Space, class T> struct Placed {
-  const Mechanism<Space> &m;
   Workspace<Space, T> &w;
   const T *q, *v, *generalized;
 };
 
 // The first pass, outward: kinematics, and where all frames are.
 template <class Space, class T>
-Placed<Space, T> place_all(const Mechanism<Space> &m, const T *q, const T *v,
-                           const std::type_identity_t<T> *generalized, Workspace<Space, T> &w);
+Placed<Space, T> place_all(const T *q, const T *v, const std::type_identity_t<T> *generalized, Workspace<Space, T> &w);
 
 // The second pass, inward, and the third, outward: accelerations a (n_v) under wrenches (as in Forces; may be null),
 // and multipliers w.lambda of constraint equations whose second time derivative is to be `target` (constraints).
@@ -143,27 +142,23 @@ void accelerations(const Placed<Space, T> &at, const std::type_identity_t<T> *wr
 
 // All three
 template <class Space, class T>
-void accelerations(const Mechanism<Space> &m, const T *q, const T *v, const Forces<T> &forces, const T *target,
-                   Workspace<Space, T> &w, T *a);
+void accelerations(const T *q, const T *v, const Forces<T> &forces, const T *target, Workspace<Space, T> &w, T *a);
 
 // What multipliers (constraints) do to a system at rest: dq (n_v) = -M^-1 C^T lambda, those of active equations, with
 // the columns of the last accelerations(), to whose state q is near. Motions and forces at ports in `w` are those of dq
 // afterwards.
-template <class Space, class T>
-void respond(const Mechanism<Space> &m, const T *q, const T *lambda, Workspace<Space, T> &w, T *dq);
+template <class Space, class T> void respond(const T *q, const T *lambda, Workspace<Space, T> &w, T *dq);
 
 // The same with the multipliers that answer a residual: dq = -M^-1 C^T (C M^-1 C^T)^-1 residual (constraints).
-template <class Space, class T>
-void response(const Mechanism<Space> &m, const T *q, const T *residual, Workspace<Space, T> &w, T *dq);
+template <class Space, class T> void response(const T *q, const T *residual, Workspace<Space, T> &w, T *dq);
 
 // What rounding of every part by `relative` leaves in the sums that the last accelerations() were: of what acts and of
 // what each multiplier does, which may cancel. To its state q is near; `w` afterwards as after respond().
 template <class Space, class T>
-void round_off(const Mechanism<Space> &m, const T *q, const std::type_identity_t<T> &relative, Workspace<Space, T> &w,
-               T *dq);
+void round_off(const T *q, const std::type_identity_t<T> &relative, Workspace<Space, T> &w, T *dq);
 
 // Values and rates of all constraint equations (m, rad; m/s, rad/s), at a state without generalized forces.
 template <class Space, class T>
-Placed<Space, T> measure(const Mechanism<Space> &m, const T *q, const T *v, Workspace<Space, T> &w, T *value, T *rate);
+Placed<Space, T> measure(const T *q, const T *v, Workspace<Space, T> &w, T *value, T *rate);
 
 } // namespace ffrobot::recursion

@@ -23,8 +23,8 @@ std::vector<Jet> targets_at(const Scene &scene, double t) {
   return found;
 }
 
-void take_off(const std::vector<Jet> &targets, const std::vector<Constraint> &constraints, Eigen::VectorXd &value,
-              Eigen::VectorXd &rate) {
+void take_off(const std::vector<Jet> &targets, const std::vector<Constraint> &constraints, VectorXd &value,
+              VectorXd &rate) {
   for (std::size_t r = 0; r < targets.size(); ++r) {
     double &of_row = value[r];
     of_row = constraints[r].apart(of_row, targets[r].value);
@@ -33,7 +33,7 @@ void take_off(const std::vector<Jet> &targets, const std::vector<Constraint> &co
 }
 
 ConstraintLaws::ConstraintLaws(const Scene &scene, std::size_t equations)
-    : laws_(laws_of(scene, equations)), sign_(Eigen::VectorXd::Ones(equations)) {
+    : laws_(laws_of(scene, equations)), sign_(VectorXd::Ones(equations)) {
   for (std::size_t r = 0; r < scene.targets.size(); ++r)
     sign_[r] = scene.targets[r].sign;
 }

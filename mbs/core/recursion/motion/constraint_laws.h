@@ -44,7 +44,7 @@ private:
   void find(const double *times, int count);
 
   FunctionsOfTime laws_; // up to their signs, at times_
-  Eigen::VectorXd sign_;
+  VectorXd sign_;
   std::vector<double> times_, accelerations_; // (times, equations)
   std::size_t next_ = 0, now_ = 0;            // of these times: most likely asked for next; time_
   double time_ = nowhere;

@@ -13,16 +13,16 @@ namespace ffrobot::recursion {
 struct FrameShare {
   int q = 0, v = 0;       // of the first mode
   Eigen::Matrix3Xd Phi_r; // (3, n) of the section
-  Eigen::Vector3d axis;   // B z: of the joint, in axes of the undeformed section
+  Vector3d axis;          // B z: of the joint, in axes of the undeformed section
 
   // Adds the modal forces of a moment m (N m along the axis, on this body) at q to those along v.
   void add(double moment, const double *q_all, double *force) const {
     const auto n = Phi_r.cols();
-    const Eigen::Vector3d phi = Phi_r * Eigen::Map<const Eigen::VectorXd>(q_all + q, n), across = phi.cross(axis);
+    const Vector3d phi = Phi_r * Map<const VectorXd>(q_all + q, n), across = phi.cross(axis);
     double a, b, a_rate, b_rate;
     spatial::rotation_series(phi.squaredNorm(), a, b, a_rate, b_rate);
-    const Eigen::Vector3d turned = axis + a * across + b * phi.cross(across); // J_l(phi) axis
-    Eigen::Map<Eigen::VectorXd>(force + v, n) -= moment * (Phi_r.transpose() * turned);
+    const Vector3d turned = axis + a * across + b * phi.cross(across); // J_l(phi) axis
+    Map<VectorXd>(force + v, n) -= moment * (Phi_r.transpose() * turned);
   }
 };
 

@@ -24,8 +24,8 @@ constexpr double immobile = 1e-24;
 constexpr double slight = 1e-6;
 
 // Both in natural sizes
-std::vector<int> pivots(Eigen::MatrixXd S, const Eigen::VectorXd &squares) {
-  const Eigen::VectorXd own = S.diagonal();
+std::vector<int> pivots(MatrixXd S, const VectorXd &squares) {
+  const VectorXd own = S.diagonal();
   const double largest = own.maxCoeff(), smallest = immobile * squares.maxCoeff();
   std::vector<int> left(S.rows()), kept;
   std::iota(left.begin(), left.end(), 0);
@@ -48,29 +48,26 @@ std::vector<int> pivots(Eigen::MatrixXd S, const Eigen::VectorXd &squares) {
 } // namespace
 
 template <class Space>
-std::vector<int> keep_independent_constraints(const Mechanism<Space> &m, const double *q, const double *v,
-                                              Workspace<Space, double> &w) {
-  const Eigen::Index count = m.constraints.size();
-  std::vector<int> all(m.constraints.size());
+std::vector<int> keep_independent_constraints(const double *q, const double *v, Workspace<Space, double> &w) {
+  const Index count = w.m.constraints.size();
+  std::vector<int> all(w.m.constraints.size());
   std::iota(all.begin(), all.end(), 0);
   w.keep(all);
   if (count == 0)
     return all;
-  const NaturalSizes sizes(m);
-  const Eigen::VectorXd squares = sizes.of_gradients(gradients(m, q, w)).rowwise().squaredNorm();
-  const std::vector<double> target(m.constraints.size(), 0.0);
-  std::vector<double> a(m.n_v);
+  const NaturalSizes sizes(w.m);
+  const VectorXd squares = sizes.of_gradients(gradients(q, w)).rowwise().squaredNorm();
+  const std::vector<double> target(w.m.constraints.size(), 0.0);
+  std::vector<double> a(w.m.n_v);
   w.keeps_delassus = true;
-  accelerations(m, q, v, Forces<double>(), target.data(), w, a.data());
+  accelerations(q, v, Forces<double>(), target.data(), w, a.data());
   w.keeps_delassus = false;
-  const Eigen::MatrixXd S = Eigen::Map<const Eigen::MatrixXd>(w.delassus.data(), count, count);
+  const MatrixXd S = Map<const MatrixXd>(w.delassus.data(), count, count);
   w.keep(pivots(sizes.of_rows().asDiagonal() * S * sizes.of_rows().asDiagonal(), squares));
   return w.active;
 }
 
-template std::vector<int> keep_independent_constraints(const Mechanism<Planar> &, const double *, const double *,
-                                                       Workspace<Planar, double> &);
-template std::vector<int> keep_independent_constraints(const Mechanism<Spatial> &, const double *, const double *,
-                                                       Workspace<Spatial, double> &);
+template std::vector<int> keep_independent_constraints(const double *, const double *, Workspace<Planar, double> &);
+template std::vector<int> keep_independent_constraints(const double *, const double *, Workspace<Spatial, double> &);
 
 } // namespace ffrobot::recursion

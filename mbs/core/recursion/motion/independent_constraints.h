@@ -8,7 +8,6 @@ namespace ffrobot::recursion {
 // Constraints to keep, found by pivoting in C M^-1 C^T at the state (q, v): what is left of a dependent constraint's
 // diagonal after elimination is rounding. Sets workspace.active. To be called where a run starts: no step looks again.
 template <class Space>
-std::vector<int> keep_independent_constraints(const Mechanism<Space> &m, const double *q, const double *v,
-                                              Workspace<Space, double> &w);
+std::vector<int> keep_independent_constraints(const double *q, const double *v, Workspace<Space, double> &w);
 
 } // namespace ffrobot::recursion

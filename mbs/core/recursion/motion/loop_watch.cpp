@@ -7,9 +7,6 @@
 
 namespace ffrobot::recursion {
 
-using Eigen::Index;
-using Eigen::VectorXd;
-
 namespace {
 
 // Of the volume of regular constraints. At such a distance from a singular posture, relative to one radian, branches
@@ -29,13 +26,13 @@ template <class Space> double volume(const Workspace<Space, double> &w) {
 } // namespace
 
 template <class Space>
-LoopWatch<Space>::LoopWatch(const Mechanism<Space> &mechanism, const Workspace<Space, double> &w)
-    : mechanism_(mechanism), multiplier_(VectorXd::Zero(mechanism.constraints.size())), answer_(mechanism.n_v),
+LoopWatch<Space>::LoopWatch(const Workspace<Space, double> &w)
+    : multiplier_(VectorXd::Zero(w.m.constraints.size())), answer_(w.m.n_v),
       least_volume_(next_to_singular * volume(w)) {}
 
 template <class Space>
 void LoopWatch<Space>::begin_at(const double *q, const Workspace<Space, double> &w, Workspace<Space, double> &other) {
-  C_0_ = gradients(mechanism_, q, other)(w.active, Eigen::all);
+  C_0_ = gradients(q, other)(w.active, Eigen::all);
   product_.resize(C_0_.rows(), C_0_.rows());
   volume_ = volume(w), cosine_ = 1;
 }
@@ -46,7 +43,7 @@ template <class Space> double LoopWatch<Space>::cosine(const double *q, Workspac
     return cosine_ = 0;
   for (std::size_t k = 0; k < w.active.size(); ++k) {
     multiplier_[w.active[k]] = 1;
-    respond(mechanism_, q, multiplier_.data(), w, answer_.data()); // -M^-1 C^T of one constraint
+    respond(q, multiplier_.data(), w, answer_.data()); // -M^-1 C^T of one constraint
     multiplier_[w.active[k]] = 0;
     product_.col(k).noalias() = C_0_ * -answer_;
   }

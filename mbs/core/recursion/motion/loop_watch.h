@@ -12,7 +12,7 @@ namespace ffrobot::recursion {
 template <class Space> class LoopWatch {
 public:
   // `w` has accelerations() at a posture that counts as regular.
-  LoopWatch(const Mechanism<Space> &mechanism, const Workspace<Space, double> &w);
+  explicit LoopWatch(const Workspace<Space, double> &w);
 
   // C_0 at q (n_q). `w`: as accelerations() near q have left it; `other` becomes one at rest.
   void begin_at(const double *q, const Workspace<Space, double> &w, Workspace<Space, double> &other);
@@ -25,10 +25,9 @@ public:
   bool is_far() const { return cosine_ < 0.5; } // it is time to begin where the last cosine was found
 
 private:
-  const Mechanism<Space> &mechanism_;
-  Eigen::MatrixXd C_0_, product_;       // (active constraints, n_v), (active constraints, active constraints)
-  Eigen::VectorXd multiplier_, answer_; // (constraints), (n_v)
-  double least_volume_, volume_ = 0;    // sqrt(det C M^-1 C^T): next to singular postures; where C_0 is
+  MatrixXd C_0_, product_;           // (active constraints, n_v), (active constraints, active constraints)
+  VectorXd multiplier_, answer_;     // (constraints), (n_v)
+  double least_volume_, volume_ = 0; // sqrt(det C M^-1 C^T): next to singular postures; where C_0 is
   double cosine_ = 1;
 };
 

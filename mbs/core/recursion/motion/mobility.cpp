@@ -8,28 +8,23 @@
 
 namespace ffrobot::recursion {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 namespace {
 
 constexpr double singular = 1e-6; // of the largest singular value: ranks of equations
 
 // Rates of constraints by the joints' velocities (constraints, joint coordinates), lengths in units of `length`
-template <class Space>
-MatrixXd gradients_by_joints(const Mechanism<Space> &m, double length, const double *q, Workspace<Space, double> &w) {
+template <class Space> MatrixXd gradients_by_joints(double length, const double *q, Workspace<Space, double> &w) {
   std::vector<int> joints, ways;
-  for (const Node<Space> &node : m.nodes)
+  for (const Node<Space> &node : w.m.nodes)
     for (int k = 0; k < node.shape.freedoms.count; ++k) {
       if (node.shape.freedoms.component[k] < Space::linear)
         ways.push_back(static_cast<int>(joints.size()));
       joints.push_back(node.v + k);
     }
-  MatrixXd J = gradients(m, q, w)(Eigen::all, joints);
+  MatrixXd J = gradients(q, w)(Eigen::all, joints);
   J(Eigen::all, ways) *= length;
-  for (std::size_t r = 0; r < m.constraints.size(); ++r)
-    if (!is_moment(m, m.constraints[r]))
+  for (std::size_t r = 0; r < w.m.constraints.size(); ++r)
+    if (!is_moment(w.m, w.m.constraints[r]))
       J.row(r) /= length;
   return J;
 }
@@ -59,9 +54,8 @@ VectorXd Mobility::hardest() const {
 }
 
 template <class Space>
-Mobility mobility(const Mechanism<Space> &m, const PostureWatch &watch, const double *q, Workspace<Space, double> &w,
-                  Index loop_rank) {
-  const MatrixXd J = gradients_by_joints(m, watch.length, q, w);
+Mobility mobility(const PostureWatch &watch, const double *q, Workspace<Space, double> &w, Index loop_rank) {
+  const MatrixXd J = gradients_by_joints(watch.length, q, w);
   RightVectors loops(rows_of(J, watch.is_path, false));
   const Index rank = loop_rank < 0 ? loops.rank(singular) : loop_rank;
   MatrixXd free = loops.null_space(rank), rates = rows_of(J, watch.is_path, true) * free;
@@ -69,9 +63,7 @@ Mobility mobility(const Mechanism<Space> &m, const PostureWatch &watch, const do
   return {std::move(loops), rank, std::move(free), std::move(rates), std::move(path)};
 }
 
-template Mobility mobility(const Mechanism<Planar> &, const PostureWatch &, const double *, Workspace<Planar, double> &,
-                           Index);
-template Mobility mobility(const Mechanism<Spatial> &, const PostureWatch &, const double *,
-                           Workspace<Spatial, double> &, Index);
+template Mobility mobility(const PostureWatch &, const double *, Workspace<Planar, double> &, Index);
+template Mobility mobility(const PostureWatch &, const double *, Workspace<Spatial, double> &, Index);
 
 } // namespace ffrobot::recursion

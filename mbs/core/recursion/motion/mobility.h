@@ -8,25 +8,24 @@ namespace ffrobot::recursion {
 
 // With rigid links. Rates are in radians, ways in lengths of the watch.
 struct Mobility {
-  RightVectors loops;         // of rates of the equations of loops by joints
-  Eigen::Index loop_rank = 0; // how many of these are independent
-  Eigen::MatrixXd free;       // (joint coordinates, freedoms) that joints and loops leave, orthonormal
-  Eigen::MatrixXd rates;      // of the path's equations by these
-  RightVectors path;          // of `rates`
+  RightVectors loops;  // of rates of the equations of loops by joints
+  Index loop_rank = 0; // how many of these are independent
+  MatrixXd free;       // (joint coordinates, freedoms) that joints and loops leave, orthonormal
+  MatrixXd rates;      // of the path's equations by these
+  RightVectors path;   // of `rates`
 
   // Smallest of largest singular value of the path's equations in the freedoms; 1 without a path
   double ratio() const { return path.ratio(rates.rows()); }
   double loop_ratio() const { return loops.ratio(loop_rank); } // the same of the loops' independent equations
-  double determinant() const;      // of `rates`; 0 with loops, where the basis of freedoms has no sign, and of others
-  Eigen::Index followed() const;   // how many of the freedoms the path takes
-  Eigen::MatrixXd left() const;    // (joint coordinates, m) motions with the path held
-  Eigen::VectorXd hardest() const; // (joint coordinates) motion that the path follows least
+  double determinant() const; // of `rates`; 0 with loops, where the basis of freedoms has no sign, and of others
+  Index followed() const;     // how many of the freedoms the path takes
+  MatrixXd left() const;      // (joint coordinates, m) motions with the path held
+  VectorXd hardest() const;   // (joint coordinates) motion that the path follows least
 };
 
 // At q; `w` is worked with. Loops have `loop_rank`, or, where that is negative, what they have here: bent links raise
 // it, and joints seem to be locked that the links let move.
 template <class Space>
-Mobility mobility(const Mechanism<Space> &m, const PostureWatch &watch, const double *q, Workspace<Space, double> &w,
-                  Eigen::Index loop_rank = -1);
+Mobility mobility(const PostureWatch &watch, const double *q, Workspace<Space, double> &w, Index loop_rank = -1);
 
 } // namespace ffrobot::recursion

@@ -8,9 +8,6 @@
 
 namespace ffrobot::recursion {
 
-using Eigen::Index;
-using Eigen::VectorXd;
-
 namespace {
 
 constexpr double singular_ratio = 4e-6; // of postures: below, joints cannot follow, and rounding leaves 1e-5 of forces
@@ -51,7 +48,7 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
       unused_(correction_) {
   go_to(t);
   if (!scene.keeps_all_constraints)
-    keep_independent_constraints(mechanism, q, v, workspace_);
+    keep_independent_constraints(q, v, workspace_);
   else if (!mechanism.constraints.empty())
     evaluate(t, q, v, correction_.data()); // projections need its factors
   newton_.keep(workspace_.active);
@@ -60,7 +57,7 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
       borne_.push_back({mechanism.nodes[of.node].v + of.freedom, r, 0});
   if (scene.has_loops && !workspace_.active.empty()) {
     evaluate(t, q, v, correction_.data()); // with the factors of the equations that are kept
-    loops_.emplace(mechanism, workspace_);
+    loops_.emplace(workspace_);
   }
   for (const GearSpring &gear : scene_.gears)
     for (const Node<Space> &node : mechanism.nodes)
@@ -114,7 +111,7 @@ template <class Space>
   if (placed)
     accelerations(*placed, forces.wrench, laws_.accelerations(), a);
   else
-    accelerations(mechanism_, q, v, forces, laws_.accelerations(), workspace_, a);
+    accelerations(q, v, forces, laws_.accelerations(), workspace_, a);
   for (const Borne &of : borne_)
     workspace_.lambda[of.row] += of.force;
 }
@@ -135,14 +132,14 @@ template <class Space> void RecursiveMotion<Space>::round_off(const double *z, d
   std::fill_n(z_dot, n_v(), 0.0);
   for (const Borne &of : borne_)
     workspace_.lambda[of.row] -= of.force;
-  recursion::round_off(mechanism_, local().state(z), relative, workspace_, z_dot + n_v());
+  recursion::round_off(local().state(z), relative, workspace_, z_dot + n_v());
 }
 
 template <class Space>
 Placed<Space, double> RecursiveMotion<Space>::residuals(double t, const double *q, const double *v,
                                                         Workspace<Space, double> &w) {
   go_to(t);
-  const auto at = measure(mechanism_, q, v, w, value_.data(), rate_.data());
+  const auto at = measure(q, v, w, value_.data(), rate_.data());
   for (Index r = 0; r < value_.size(); ++r) {
     const Jet law = laws_.of(r);
     value_[r] = mechanism_.constraints[r].apart(value_[r], law.value);
@@ -162,7 +159,7 @@ double RecursiveMotion<Space>::project(double t, double *q, double *v, Workspace
   constexpr int refresh_after = 3, most_iterations = 12;
   if (mechanism_.constraints.empty())
     return 0;
-  Eigen::Map<VectorXd> v_(v, n_v());
+  Map<VectorXd> v_(v, n_v());
   double left = 0, previous = std::numeric_limits<double>::infinity();
   for (int i = 0; i < most_iterations; ++i) {
     const auto at = residuals(t, q, v, w);
@@ -176,10 +173,10 @@ double RecursiveMotion<Space>::project(double t, double *q, double *v, Workspace
     previous = left;
     if (i >= refresh_after)
       evaluate(t, q, v, correction_.data());
-    response(mechanism_, q, rate_.data(), workspace_, correction_.data());
+    response(q, rate_.data(), workspace_, correction_.data());
     v_ += correction_;
     if (position > tolerance) {
-      response(mechanism_, q, value_.data(), workspace_, correction_.data());
+      response(q, value_.data(), workspace_, correction_.data());
       local().space().integrate(q, 1, correction_.data(), q);
     }
   }
@@ -189,7 +186,7 @@ double RecursiveMotion<Space>::project(double t, double *q, double *v, Workspace
 template <class Space> bool RecursiveMotion<Space>::correct(double t, double *z) {
   if (local().space().is_flat())
     return project(t, z, z + n_v()) < is_on;
-  state_ = Eigen::Map<const VectorXd>(local().state(z), local().state_size());
+  state_ = Map<const VectorXd>(local().state(z), local().state_size());
   const double left = project(t, state_.data(), state_.data() + mechanism_.n_q);
   local().from_state(state_.data(), z);
   return left < is_on;
@@ -225,7 +222,7 @@ template <class Space> double RecursiveMotion<Space>::error_size(double t, const
   // Forces amplify errors of the state (stiffness times the error of a fast mode): measure what e does to them. Where
   // it is small, in a difference that rounding of forces does not disturb.
   const double stretch = size > 0 ? std::max(1.0, least_shift / size) : 1;
-  shifted_ = Eigen::Map<const VectorXd>(z, 2 * n_v()) + stretch * Eigen::Map<const VectorXd>(e, 2 * n_v());
+  shifted_ = Map<const VectorXd>(z, 2 * n_v()) + stretch * Map<const VectorXd>(e, 2 * n_v());
   const double *q = local().state(shifted_.data());
   evaluate(t, q, shifted_.data() + n_v(), unused_.data());
   const double change = norm_.of_observed(workspace_, motors_at(q)) - rounding_of_multipliers(workspace_);
@@ -254,7 +251,7 @@ template <class Space> void RecursiveMotion<Space>::watch_posture(double t, cons
   if (!scene_.watch)
     return;
   go_to(t);
-  look(mechanism_, *scene_.watch, t, q, measured_, postures_);
+  look(*scene_.watch, t, q, measured_, postures_);
 }
 
 template <class Space> Index RecursiveMotion<Space>::prescribed() const {
@@ -277,11 +274,10 @@ template <class Space> void RecursiveMotion<Space>::prescribe(double t, double *
 template <class Space> bool RecursiveMotion<Space>::is_sensible(const double *z) const {
   for (std::size_t i = 0; i < scene_.modal_amplitude_limits.size(); ++i) {
     const Node<Space> &node = mechanism_.nodes[i];
-    if (!(Eigen::Map<const VectorXd>(z + node.p_v(), node.n()).squaredNorm() <= scene_.modal_amplitude_limits[i]))
+    if (!(Map<const VectorXd>(z + node.p_v(), node.n()).squaredNorm() <= scene_.modal_amplitude_limits[i]))
       return false;
   }
-  return postures_.least_ratio >= singular_ratio &&
-         (0 * Eigen::Map<const Eigen::ArrayXd>(z, 2 * n_v())).sum() == 0; // all finite
+  return postures_.least_ratio >= singular_ratio && (0 * Map<const ArrayXd>(z, 2 * n_v())).sum() == 0; // all finite
 }
 
 template <class Space> void RecursiveMotion<Space>::go_on(const MotionHistory &history) {
@@ -298,8 +294,8 @@ template <class Space> void RecursiveMotion<Space>::linearise(double t, const do
 template <class Space>
 void RecursiveMotion<Space>::constraint_values(double t, const double *z, double *value, double *rate) {
   residuals(t, local().state(z), z + n_v(), measured_);
-  Eigen::Map<VectorXd>(value, value_.size()) = value_;
-  Eigen::Map<VectorXd>(rate, rate_.size()) = rate_;
+  Map<VectorXd>(value, value_.size()) = value_;
+  Map<VectorXd>(rate, rate_.size()) = rate_;
 }
 
 template <class Space> double RecursiveMotion<Space>::value_size(const double *z, const VectorXd &value) const {

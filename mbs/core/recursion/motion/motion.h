@@ -21,6 +21,8 @@ struct MotionHistory {
   NormPeaks peaks;
   unsigned long accepted = 0; // steps
   PostureHistory postures;
+
+  FFROBOT_FIELDS(peaks, accepted, postures);
 };
 
 template <class Space> class RecursiveMotion final : public OdeSystem {
@@ -42,15 +44,15 @@ public:
   double change_size(const double *z, const double *change, double rate) const override;
   void accepted(double t, const double *z, const double *z_dot) override;
   bool is_sensible(const double *z) const override;
-  Eigen::Index prescribed() const override; // of the scene's loads and targets, which limit steps
+  Index prescribed() const override; // of the scene's loads and targets, which limit steps
   void prescribe(double t, double *f) override;
   double initial_step() const override { return 0.1 / std::max(fastest_, norm_.sizes().pace()); }
   unsigned long evaluations() const override { return workspace_.evaluations; }
 
-  Eigen::Index constraints() const override { return value_.size(); }
-  const Eigen::VectorXd &stiffness() const override { return newton_.stiffness(); }
-  const Eigen::VectorXd &damping() const override { return newton_.damping(); }
-  const Eigen::MatrixXd &coupling() const override { return newton_.coupling(); }
+  Index constraints() const override { return value_.size(); }
+  const VectorXd &stiffness() const override { return newton_.stiffness(); }
+  const VectorXd &damping() const override { return newton_.damping(); }
+  const MatrixXd &coupling() const override { return newton_.coupling(); }
   void linearise(double t, const double *z) override;
   void factorise(double of_damping, double of_stiffness) override { newton_.factorise(of_damping, of_stiffness); }
   void factorise(Complex of_damping, Complex of_stiffness) override { newton_.factorise(of_damping, of_stiffness); }
@@ -58,8 +60,8 @@ public:
   void solve(const Complex *r, Complex *x) override { newton_.solve(r, x); }
   void constrain(const double *x, double *c) override { newton_.constrain(x, c); }
   void constraint_values(double t, const double *z, double *value, double *rate) override;
-  double value_size(const double *z, const Eigen::VectorXd &value) const override;
-  double rate_size(const double *z, const Eigen::VectorXd &rate) const override;
+  double value_size(const double *z, const VectorXd &value) const override;
+  double rate_size(const double *z, const VectorXd &rate) const override;
 
   // At a state (q, v): accelerations (n_v); multipliers are in workspace().lambda
   void evaluate(double t, const double *q, const double *v, double *a);
@@ -89,7 +91,7 @@ private:
   bool correct(double t, double *z); // moves z onto the constraint equations; false where that fails
   Placed<Space, double> residuals(double t, const double *q, const double *v, Workspace<Space, double> &w);
   double project(double t, double *q, double *v, Workspace<Space, double> &w); // w: where residuals are measured
-  const Eigen::VectorXd *motors_at(const double *q); // of the last evaluation; null where they are not judged
+  const VectorXd *motors_at(const double *q); // of the last evaluation; null where they are not judged
 
   const Mechanism<Space> &mechanism_;
   const Scene &scene_;
@@ -114,8 +116,8 @@ private:
   double between_postures_ = 0;                             // s
   double fastest_ = 0;                                      // 1/s, of modes
 
-  Eigen::VectorXd value_, rate_;                          // (constraints)
-  Eigen::VectorXd correction_, state_, shifted_, unused_; // of projections; (q, v); of error_size()
+  VectorXd value_, rate_;                          // (constraints)
+  VectorXd correction_, state_, shifted_, unused_; // of projections; (q, v); of error_size()
 };
 
 extern template class RecursiveMotion<Planar>;

@@ -10,9 +10,6 @@
 
 namespace ffrobot::recursion {
 
-using Eigen::Index;
-using Eigen::VectorXd;
-
 namespace {
 
 constexpr double small_force = 2e-4; // of the largest: forces below count like this one

@@ -1,6 +1,7 @@
 // What the tolerance of a run in joint coordinates bounds: errors relative to the largest so far of what is alike.
 #pragma once
 
+#include "core/fields.h"
 #include "core/recursion/motion/natural_sizes.h"
 
 namespace ffrobot::recursion {
@@ -11,6 +12,8 @@ constexpr double small_twist = 1e-5; // rad, of a spring: rounding of angles is 
 struct NormPeaks {
   std::vector<double> state, force;
   double inertial = 0;
+
+  FFROBOT_FIELDS(state, force, inertial);
 };
 
 // Alike are all ways of joints, all their angles, each body's modes, the rates of each of these, the multipliers of one
@@ -42,8 +45,8 @@ public:
 
   // Keeps the forces of the last evaluation: multipliers, then those at ports; then, of another at a state that an
   // error has shifted, by how much these differ. `motors`: theirs there; null where they are not judged.
-  void observe(const Workspace<Space, double> &w, const Eigen::VectorXd *motors = nullptr);
-  double of_observed(const Workspace<Space, double> &w, const Eigen::VectorXd *motors = nullptr);
+  void observe(const Workspace<Space, double> &w, const VectorXd *motors = nullptr);
+  double of_observed(const Workspace<Space, double> &w, const VectorXd *motors = nullptr);
   bool observes() const { return !force_group_.empty(); }
 
   // Peaks grow by the state z, its rate and the forces observed there; w: as at the last evaluation. `applied` (n_v):
@@ -58,9 +61,9 @@ private:
   void group_forces();
   void find_pace();
   void add_squares(const double *z) const;
-  void forces(const Workspace<Space, double> &w, const Eigen::VectorXd *motors, Eigen::VectorXd &values) const;
+  void forces(const Workspace<Space, double> &w, const VectorXd *motors, VectorXd &values) const;
   void take_accelerations(const Workspace<Space, double> &w);
-  void sizes_of_forces(const Eigen::VectorXd &values, std::vector<double> &size) const;
+  void sizes_of_forces(const VectorXd &values, std::vector<double> &size) const;
   struct Largest {
     double force, moment; // N, N m
   };
@@ -72,7 +75,7 @@ private:
   double of_paths_ = 0, slow_acceleration_ = 0; // m/s^2: of paths; smaller ones count like this one
   std::vector<int> group_; // of each of 2 n_v entries of z; those of rates follow those of what they are of
   struct Run {             // entries of v side by side of one group
-    Eigen::Index first, count;
+    Index first, count;
     std::size_t group;
   };
   std::vector<Run> runs_;
@@ -89,7 +92,7 @@ private:
   std::vector<char> is_moment_;  // of each group of these
   std::vector<double> leverage_; // of each: more than 1 of those from which other forces follow, or that stand alone
   std::vector<double> force_peak_, force_now_, force_error_;
-  Eigen::VectorXd observed_, change_;
+  VectorXd observed_, change_;
   double of_springs_ = 0; // N m, moments below count like this one
   double inertial_ = 0;   // N, largest sum of mass times acceleration
 };
@@ -100,7 +103,7 @@ public:
   virtual ~MotorForces() = default;
   virtual std::vector<bool> are_moments() const = 0; // N m, else N
   // At q (n_q), of which w has the kinematics and the multipliers
-  virtual const Eigen::VectorXd &find(const double *q, const Workspace<Space, double> &w) = 0;
+  virtual const VectorXd &find(const double *q, const Workspace<Space, double> &w) = 0;
 };
 
 } // namespace ffrobot::recursion

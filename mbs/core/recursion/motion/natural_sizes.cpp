@@ -5,9 +5,6 @@
 
 namespace ffrobot::recursion {
 
-using Eigen::Index;
-using Eigen::VectorXd;
-
 namespace {
 
 double farthest(const planar::Body &b) {
@@ -69,14 +66,14 @@ template <class Space> NaturalSizes<Space>::NaturalSizes(const Mechanism<Space> 
 template <class Space> void NaturalSizes<Space>::plan(double duration) { pace_ = std::max(1 / duration, by_gravity_); }
 
 template <class Space> double NaturalSizes<Space>::of_values(const VectorXd &value, const double *q) const {
-  return largest(value, of_row_) / (1 + largest(Eigen::Map<const VectorXd>(q, of_q_.size()), of_q_));
+  return largest(value, of_row_) / (1 + largest(Map<const VectorXd>(q, of_q_.size()), of_q_));
 }
 
 template <class Space> double NaturalSizes<Space>::of_rates(const VectorXd &rate, const double *v) const {
-  return largest(rate, of_row_) / (pace_ + largest(Eigen::Map<const VectorXd>(v, of_v_.size()), of_v_));
+  return largest(rate, of_row_) / (pace_ + largest(Map<const VectorXd>(v, of_v_.size()), of_v_));
 }
 
-template <class Space> Eigen::MatrixXd NaturalSizes<Space>::of_gradients(const Eigen::MatrixXd &gradients) const {
+template <class Space> MatrixXd NaturalSizes<Space>::of_gradients(const MatrixXd &gradients) const {
   return of_row_.asDiagonal() * gradients * of_v_.cwiseInverse().asDiagonal();
 }
 

@@ -23,18 +23,18 @@ public:
 
   // What constraints (constraints) leave at q and v: values relative to lengths or radians and to the largest of q,
   // their rates to the largest of v and to the pace.
-  double of_values(const Eigen::VectorXd &value, const double *q) const;
-  double of_rates(const Eigen::VectorXd &rate, const double *v) const;
+  double of_values(const VectorXd &value, const double *q) const;
+  double of_rates(const VectorXd &rate, const double *v) const;
 
   // Gradients (constraints, n_v) in natural sizes of constraints and of v, the same in all units.
-  Eigen::MatrixXd of_gradients(const Eigen::MatrixXd &gradients) const;
-  const Eigen::VectorXd &of_rows() const { return of_row_; } // (constraints), 1 over their sizes
+  MatrixXd of_gradients(const MatrixXd &gradients) const;
+  const VectorXd &of_rows() const { return of_row_; } // (constraints), 1 over their sizes
 
 private:
   double by_gravity_ = 0, pace_ = 1;
   double length_ = 0;
   std::vector<double> reach_;
-  Eigen::VectorXd of_row_, of_q_, of_v_; // (constraints), (n_q), (n_v): 1 over 1 rad, length_, of p sqrt(mass) times it
+  VectorXd of_row_, of_q_, of_v_; // (constraints), (n_q), (n_v): 1 over 1 rad, length_, of p sqrt(mass) times it
 };
 
 } // namespace ffrobot::recursion

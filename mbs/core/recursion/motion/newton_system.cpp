@@ -4,10 +4,6 @@
 
 namespace ffrobot::recursion {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 namespace {
 
 // N, N m: a force beside which what acts at rest is small, so that differences of accelerations keep their digits
@@ -17,8 +13,8 @@ constexpr double least_root = 1e-100; // of E: B x is found as y / S
 
 // A x, A real
 VectorXd product(const MatrixXd &A, const VectorXd &x) { return A * x; }
-Eigen::VectorXcd product(const MatrixXd &A, const Eigen::VectorXcd &x) {
-  Eigen::VectorXcd y(A.rows());
+VectorXcd product(const MatrixXd &A, const VectorXcd &x) {
+  VectorXcd y(A.rows());
   y.real() = A * x.real(), y.imag() = A * x.imag();
   return y;
 }
@@ -70,7 +66,7 @@ template <class Space> void NewtonSystem<Space>::find_coupling() {
   VectorXd unit = rest_, rates(scene_.cut_joints.size());
   for (Index i = 0; i < unit.size(); ++i) {
     unit[i] = 1;
-    cut_rates(place_all(mechanism_, q_.data(), unit.data(), nullptr, w_), scene_.cut_joints, rates.data());
+    cut_rates(place_all(q_.data(), unit.data(), nullptr, w_), scene_.cut_joints, rates.data());
     coupling_.row(i).head(rates.size()) = rates.transpose();
     unit[i] = 0;
   }
@@ -91,8 +87,7 @@ template <class Space> void NewtonSystem<Space>::find_responses() {
   const VectorXd none = VectorXd::Zero(equations);
   const auto evaluate = [&](const VectorXd &force) {
     VectorXd a(rest_.size());
-    accelerations(mechanism_, q_.data(), rest_.data(), Forces<double>{force.data(), nullptr}, none.data(), w_,
-                  a.data());
+    accelerations(q_.data(), rest_.data(), Forces<double>{force.data(), nullptr}, none.data(), w_, a.data());
     return a;
   };
   const VectorXd start = evaluate(rest_);
@@ -111,14 +106,14 @@ template <class Space> void NewtonSystem<Space>::find_responses() {
   VectorXd unit = none;
   for (const int r : w_.active) {
     unit[r] = -1;
-    response(mechanism_, q_.data(), unit.data(), w_, R_.col(r).data());
+    response(q_.data(), unit.data(), w_, R_.col(r).data());
     unit[r] = 0;
   }
 }
 
 template <class Space> void NewtonSystem<Space>::linearise(const double *q, const double *v) {
-  q_ = Eigen::Map<const VectorXd>(q, q_.size());
-  const Eigen::Map<const VectorXd> v_(v, rest_.size());
+  q_ = Map<const VectorXd>(q, q_.size());
+  const Map<const VectorXd> v_(v, rest_.size());
   if (!scene_.cut_joints.empty())
     find_coupling();
   VectorXd rates(stiffness_.size());
@@ -140,9 +135,8 @@ void NewtonSystem<Space>::factorise(Scalar damping_factor, Scalar stiffness_fact
 // x: R c in, zero where it is complex
 template <class Space>
 template <class Scalar>
-void NewtonSystem<Space>::solve(const Factors<Scalar> &factors, const Scalar *r, Eigen::Map<Vector<Scalar>> x) const {
-  Vector<Scalar> f = Eigen::Map<const Vector<Scalar>>(r, stiffness_.size())(stiff_),
-                 stiff = along_stiff<Vector<Scalar>>(x);
+void NewtonSystem<Space>::solve(const Factors<Scalar> &factors, const Scalar *r, Map<Vector<Scalar>> x) const {
+  Vector<Scalar> f = Map<const Vector<Scalar>>(r, stiffness_.size())(stiff_), stiff = along_stiff<Vector<Scalar>>(x);
   f.array() /= factors.S.array();
   f -= factors.S.cwiseProduct(stiff);
   solve_symmetric(factors.symmetric, f);
@@ -154,24 +148,24 @@ void NewtonSystem<Space>::solve(const Factors<Scalar> &factors, const Scalar *r,
 }
 
 template <class Space> void NewtonSystem<Space>::solve(const double *r, const double *c, double *x) {
-  Eigen::Map<VectorXd> x_(x, rest_.size());
+  Map<VectorXd> x_(x, rest_.size());
   x_.setZero();
   if (c)
-    x_ = R_ * Eigen::Map<const VectorXd>(c, R_.cols());
+    x_ = R_ * Map<const VectorXd>(c, R_.cols());
   solve(real_, r, x_);
 }
 
 template <class Space> void NewtonSystem<Space>::solve(const Complex *r, Complex *x) {
-  Eigen::Map<Vector<Complex>> x_(x, rest_.size());
+  Map<Vector<Complex>> x_(x, rest_.size());
   x_.setZero();
   solve(complex_, r, x_);
 }
 
 template <class Space> void NewtonSystem<Space>::constrain(const double *x, double *c) {
   VectorXd value(R_.cols()), at_rest(R_.cols());
-  measure(mechanism_, q_.data(), rest_.data(), w_, value.data(), at_rest.data());
-  measure(mechanism_, q_.data(), x, w_, value.data(), c);
-  Eigen::Map<VectorXd>(c, R_.cols()) -= at_rest; // of markers that turn
+  measure(q_.data(), rest_.data(), w_, value.data(), at_rest.data());
+  measure(q_.data(), x, w_, value.data(), c);
+  Map<VectorXd>(c, R_.cols()) -= at_rest; // of markers that turn
 }
 
 template class NewtonSystem<Planar>;

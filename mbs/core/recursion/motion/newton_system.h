@@ -23,9 +23,9 @@ public:
   void keep(const std::vector<int> &equations) { w_.keep(equations); } // these alone
 
   // Diagonals (n_v, cut joints, gears); slopes of friction and of gears as at the last linearise()
-  const Eigen::VectorXd &stiffness() const { return stiffness_; }
-  const Eigen::VectorXd &damping() const { return damping_; }
-  const Eigen::MatrixXd &coupling() const { return coupling_; } // (n_v, cut joints and gears), rates: coupling^T v
+  const VectorXd &stiffness() const { return stiffness_; }
+  const VectorXd &damping() const { return damping_; }
+  const MatrixXd &coupling() const { return coupling_; } // (n_v, cut joints and gears), rates: coupling^T v
 
   // As OdeSystem has these
   void linearise(const double *q, const double *v);
@@ -40,28 +40,27 @@ public:
   Workspace<Space, double> &workspace() { return w_; } // for evaluations at rest
 
 private:
-  template <class Scalar> using Vector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
+  template <class Scalar> using Vector = Matrix<Scalar, Dynamic, 1>;
   template <class Scalar> struct Factors {
-    Vector<Scalar> S;                                                // (stiff)
-    Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> symmetric; // 1 + S G S as L and 1/D (symmetric_factors.h)
+    Vector<Scalar> S;                           // (stiff)
+    Matrix<Scalar, Dynamic, Dynamic> symmetric; // 1 + S G S as L and 1/D (symmetric_factors.h)
   };
 
-  void take_slopes(const Eigen::VectorXd &rates);
+  void take_slopes(const VectorXd &rates);
   void find_coupling();
   void find_responses();
   template <class Matrix> Matrix along_stiff(const Matrix &x) const; // B x
   template <class Scalar>
   void factorise(Scalar damping_factor, Scalar stiffness_factor, Factors<Scalar> &factors) const;
-  template <class Scalar>
-  void solve(const Factors<Scalar> &factors, const Scalar *r, Eigen::Map<Vector<Scalar>> x) const;
+  template <class Scalar> void solve(const Factors<Scalar> &factors, const Scalar *r, Map<Vector<Scalar>> x) const;
 
   const Mechanism<Space> &mechanism_;
   const Scene &scene_;
   Workspace<Space, double> w_;
-  Eigen::VectorXd q_, rest_, stiffness_, damping_; // (n_q), (n_v) zeros
-  Eigen::MatrixXd coupling_;
-  std::vector<Eigen::Index> stiff_, free_; // of the diagonals: entries that may not be zero, ascending; others
-  Eigen::MatrixXd P_, G_, R_;              // P (free, stiff); R of all equations, zero of those that are not kept
+  VectorXd q_, rest_, stiffness_, damping_; // (n_q), (n_v) zeros
+  MatrixXd coupling_;
+  std::vector<Index> stiff_, free_; // of the diagonals: entries that may not be zero, ascending; others
+  MatrixXd P_, G_, R_;              // P (free, stiff); R of all equations, zero of those that are not kept
   Factors<double> real_;
   Factors<Complex> complex_;
 };

@@ -5,20 +5,16 @@
 
 namespace ffrobot::recursion {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 using Times = std::vector<double>;
 
 namespace {
 
 // C_v at the state that `w` has
 template <class Space>
-MatrixXd gradients_there(const Mechanism<Space> &m, const double *q, NewtonEuler<Space> &forces,
-                         Workspace<Space, double> &w) {
-  const Index count = m.constraints.size();
-  VectorXd unit = VectorXd::Zero(count), along(m.n_v);
-  MatrixXd found(count, m.n_v);
+MatrixXd gradients_there(const double *q, NewtonEuler<Space> &forces, Workspace<Space, double> &w) {
+  const Index count = w.m.constraints.size();
+  VectorXd unit = VectorXd::Zero(count), along(w.m.n_v);
+  MatrixXd found(count, w.m.n_v);
   for (Index r = 0; r < count; ++r) {
     unit[r] = -1; // loads are of -lambda
     forces.load(unit.data(), nullptr, w);
@@ -31,16 +27,16 @@ MatrixXd gradients_there(const Mechanism<Space> &m, const double *q, NewtonEuler
 
 } // namespace
 
-template <class Space> MatrixXd gradients(const Mechanism<Space> &m, const double *q, Workspace<Space, double> &w) {
-  place_all(m, q, VectorXd::Zero(m.n_v).eval().data(), nullptr, w);
-  NewtonEuler<Space> forces(m);
-  return gradients_there(m, q, forces, w);
+template <class Space> MatrixXd gradients(const double *q, Workspace<Space, double> &w) {
+  place_all(q, VectorXd::Zero(w.m.n_v).eval().data(), nullptr, w);
+  NewtonEuler<Space> forces(w.m);
+  return gradients_there(q, forces, w);
 }
 
 template <class Space>
-Postures<Space>::Postures(const Mechanism<Space> &m, const Scene &scene, Workspace<Space, double> &w)
-    : m_(m), scene_(scene), w_(w), forces_(m), value_(m.constraints.size()), rate_(value_),
-      still_(VectorXd::Zero(m.n_v)) {}
+Postures<Space>::Postures(const Scene &scene, Workspace<Space, double> &w)
+    : scene_(scene), w_(w), forces_(w.m), value_(w.m.constraints.size()), rate_(value_),
+      still_(VectorXd::Zero(w.m.n_v)) {}
 
 template <class Space> void Postures<Space>::go_to(double t) {
   turn_markers(scene_, t, w_);
@@ -48,19 +44,19 @@ template <class Space> void Postures<Space>::go_to(double t) {
 }
 
 template <class Space> void Postures<Space>::measure(const double *q, const double *v) {
-  recursion::measure(m_, q, v, w_, value_.data(), rate_.data());
-  take_off(targets_, m_.constraints, value_, rate_);
+  recursion::measure(q, v, w_, value_.data(), rate_.data());
+  take_off(targets_, w_.m.constraints, value_, rate_);
 }
 
 template <class Space>
 std::pair<RowMajor, RowMajor> Postures<Space>::constraints(const Times &times, const RowMajor &q) {
-  RowMajor values(q.rows(), value_.size()), slopes(q.rows(), value_.size() * m_.n_v);
+  RowMajor values(q.rows(), value_.size()), slopes(q.rows(), value_.size() * w_.m.n_v);
   for (Index i = 0; i < q.rows(); ++i) {
     const double *at = q.row(i).data();
     go_to(times[i]);
     measure(at, still_.data());
     values.row(i) = value_.transpose();
-    Eigen::Map<RowMajor>(slopes.row(i).data(), value_.size(), m_.n_v) = gradients_there(m_, at, forces_, w_);
+    Map<RowMajor>(slopes.row(i).data(), value_.size(), w_.m.n_v) = gradients_there(at, forces_, w_);
   }
   return {values, slopes};
 }
@@ -79,10 +75,10 @@ template <class Space>
 std::pair<RowMajor, VectorXd> Postures<Space>::solve(const Times &times, RowMajor q, const RowMajor &beside,
                                                      const PostureSearch &search) {
   constexpr double tolerance = 1e-13, floor = 1e-12;
-  const ConfigurationSpace space(m_.n_v, m_.rotations);
+  const ConfigurationSpace space(w_.m.n_v, w_.m.rotations);
   LeastNorm factors;
   std::vector<Index> moving;
-  for (Index k = 0; k < m_.n_v; ++k)
+  for (Index k = 0; k < w_.m.n_v; ++k)
     if (search.scales[k] > 0)
       moving.push_back(k);
   const VectorXd scales = search.scales(moving);
@@ -96,7 +92,7 @@ std::pair<RowMajor, VectorXd> Postures<Space>::solve(const Times &times, RowMajo
     const auto off = [&] {
       measure(at, still_.data());
       value_.array() /= search.sizes.array();
-      J = gradients_there(m_, at, forces_, w_)(Eigen::all, moving);
+      J = gradients_there(at, forces_, w_)(Eigen::all, moving);
       J.array().colwise() /= search.sizes.array();
       J.array().rowwise() *= scales.transpose().array();
       return J.allFinite() ? value_.template lpNorm<Eigen::Infinity>() : std::nan("");
@@ -116,8 +112,8 @@ std::pair<RowMajor, VectorXd> Postures<Space>::solve(const Times &times, RowMajo
   return {std::move(q), left};
 }
 
-template MatrixXd gradients(const Mechanism<Planar> &, const double *, Workspace<Planar, double> &);
-template MatrixXd gradients(const Mechanism<Spatial> &, const double *, Workspace<Spatial, double> &);
+template MatrixXd gradients(const double *, Workspace<Planar, double> &);
+template MatrixXd gradients(const double *, Workspace<Spatial, double> &);
 template class Postures<Planar>;
 template class Postures<Spatial>;
 

@@ -9,12 +9,9 @@
 
 namespace ffrobot::recursion {
 
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
 // C_v (constraints, n_v) at q (n_q): row by row the generalized forces of a unit multiplier, by virtual work. `w` has
 // the kinematics of q at rest afterwards.
-template <class Space>
-Eigen::MatrixXd gradients(const Mechanism<Space> &m, const double *q, Workspace<Space, double> &w);
+template <class Space> MatrixXd gradients(const double *q, Workspace<Space, double> &w);
 
 // Newton's method onto a posture: off() says how far it is and finds a step, go() makes it. What is left in the end:
 // below `tolerance`, or below `floor` and not falling any more, or NaN; or what is left of the last iteration.
@@ -32,8 +29,8 @@ template <class Off, class Go> double iterate_to_posture(double tolerance, doubl
 }
 
 struct PostureSearch {
-  Eigen::VectorXd scales;  // (n_v) natural sizes of coordinates; those of size 0 stay
-  Eigen::VectorXd sizes;   // (constraints) natural sizes of values
+  VectorXd scales;         // (n_v) natural sizes of coordinates; those of size 0 stay
+  VectorXd sizes;          // (constraints) natural sizes of values
   double largest_step = 1; // of any coordinate, in natural sizes: keeps to the branch of the guess
 };
 
@@ -41,7 +38,7 @@ struct PostureSearch {
 // outlive it; `w` is worked with.
 template <class Space> class Postures {
 public:
-  Postures(const Mechanism<Space> &m, const Scene &scene, Workspace<Space, double> &w);
+  Postures(const Scene &scene, Workspace<Space, double> &w);
 
   // Values less targets (T, constraints), m or rad, of which full turns do not count, and C_v (T, constraints n_v), row
   // by row
@@ -52,19 +49,18 @@ public:
 
   // q moved onto the constraint equations by the least steps, and the largest residual (T) that is left, in natural
   // sizes; NaN where it is not finite. `beside` (T, constraints; or empty) adds to targets.
-  std::pair<RowMajor, Eigen::VectorXd> solve(const std::vector<double> &times, RowMajor q, const RowMajor &beside,
-                                             const PostureSearch &search);
+  std::pair<RowMajor, VectorXd> solve(const std::vector<double> &times, RowMajor q, const RowMajor &beside,
+                                      const PostureSearch &search);
 
 private:
   void go_to(double t);
   void measure(const double *q, const double *v); // less targets
 
-  const Mechanism<Space> &m_;
   const Scene &scene_;
   Workspace<Space, double> &w_;
   NewtonEuler<Space> forces_;
   std::vector<Jet> targets_;
-  Eigen::VectorXd value_, rate_, still_;
+  VectorXd value_, rate_, still_;
 };
 
 } // namespace ffrobot::recursion

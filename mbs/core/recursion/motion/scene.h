@@ -1,6 +1,7 @@
 // What a mechanism follows and what acts on it, as the caller says it.
 #pragma once
 
+#include "core/fields.h"
 #include "core/integrate/limit_watch.h"
 #include "core/recursion/constrained_aba/loop_joint.h"
 #include "core/recursion/constrained_aba/point_force.h"
@@ -20,7 +21,7 @@ namespace ffrobot::recursion {
 // `magnitude`(t) times a direction in generalized forces: joint moments, modal
 // forces of patches.
 struct Load {
-  Load(const Eigen::VectorXd &direction,
+  Load(const VectorXd &direction,
        TimeFunction magnitude_); // direction (n_v)
 
   std::vector<std::pair<int, double>> along; // entries of v that it acts on
@@ -48,12 +49,16 @@ struct JointForce {
   double stiffness = 0; // N m/rad, N/m
   double rest = 0;      // rad, m
   Friction friction;
+
+  FFROBOT_FIELDS(q, v, stiffness, rest, friction);
 };
 
 // Moment (N m) of a twist (rad), odd and piecewise linear: slopes (N m/rad), and the twists from which on the next one
 // counts. A linear spring has one slope.
 struct TwistSpring {
   std::vector<double> slopes{0}, knots;
+
+  FFROBOT_FIELDS(slopes, knots);
 
   double moment(double twist) const {
     const double way = std::abs(twist);
@@ -84,10 +89,14 @@ struct TwistSpring {
 struct GearSpring {
   struct Side {
     int q = 0, v = 0;
+
+    FFROBOT_FIELDS(q, v);
   } a, b;
   double ratio = 1;
   TwistSpring spring;
   double damping = 0; // N m s/rad
+
+  FFROBOT_FIELDS(a, b, ratio, spring, damping);
 };
 
 // `share` times `magnitude`(t), N m or N, along the coordinate of a joint at which a loop is cut.
@@ -136,7 +145,7 @@ template <class Workspace> void turn_markers(const Scene &scene, double t, Works
 std::vector<Jet> targets_at(const Scene &scene, double t); // of all constraint equations
 
 // Takes targets off the values and rates (constraints) that measure() has found.
-void take_off(const std::vector<Jet> &targets, const std::vector<Constraint> &constraints, Eigen::VectorXd &value,
-              Eigen::VectorXd &rate);
+void take_off(const std::vector<Jet> &targets, const std::vector<Constraint> &constraints, VectorXd &value,
+              VectorXd &rate);
 
 } // namespace ffrobot::recursion

@@ -4,9 +4,6 @@
 
 namespace ffrobot::recursion {
 
-using Eigen::Index;
-using Eigen::VectorXd;
-
 Load::Load(const VectorXd &direction, TimeFunction magnitude_) : magnitude(std::move(magnitude_)) {
   for (Index i = 0; i < direction.size(); ++i)
     if (direction[i] != 0)
@@ -39,7 +36,7 @@ typename SceneForces<Space>::Acting SceneForces<Space>::at(double t, const doubl
   if (external_)
     external_->add(t, q, generalized_.data(), wrench_.data());
   if (!scene_.point_forces.empty() || !scene_.cut_joints.empty()) {
-    const auto &at = found.placed.emplace(place_all(mechanism_, q, v, found.forces.generalized, w));
+    const auto &at = found.placed.emplace(place_all(q, v, found.forces.generalized, w));
     add_at_points(at, scene_.point_forces, t, length_, wrench_.data());
     cut_rates(at, scene_.cut_joints, along_cuts_.data());
     for (Index k = 0; k < along_cuts_.size(); ++k)

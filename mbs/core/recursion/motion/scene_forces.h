@@ -53,7 +53,7 @@ private:
   ExternalForces *external_;
   const double length_; // m, natural one
   const bool has_generalized_, has_wrenches_;
-  Eigen::VectorXd generalized_, wrench_, along_cuts_; // (n_v), (wrenches, dim), (cut joints)
+  VectorXd generalized_, wrench_, along_cuts_; // (n_v), (wrenches, dim), (cut joints)
 };
 
 } // namespace ffrobot::recursion

@@ -7,11 +7,10 @@
 namespace ffrobot::recursion {
 
 template <class Space>
-void look(const Mechanism<Space> &m, const PostureWatch &watch, double t, const double *q, Workspace<Space, double> &w,
-          PostureHistory &history) {
+void look(const PostureWatch &watch, double t, const double *q, Workspace<Space, double> &w, PostureHistory &history) {
   double ratio = 1, determinant = 0, at = t;
   if (std::ranges::find(watch.is_path, 1) != watch.is_path.end()) {
-    const Mobility found = mobility(m, watch, q, w);
+    const Mobility found = mobility(watch, q, w);
     ratio = found.ratio(), determinant = found.determinant();
   }
   if (determinant * history.determinant < 0) { // between this posture and the last
@@ -21,13 +20,11 @@ void look(const Mechanism<Space> &m, const PostureWatch &watch, double t, const 
   history.determinant = determinant, history.watched_at = t;
   if (ratio < history.least_ratio) {
     history.least_ratio = ratio, history.singular_at = at;
-    history.singular_posture = Eigen::Map<const Eigen::VectorXd>(q, m.n_q);
+    history.singular_posture = Map<const VectorXd>(q, w.m.n_q);
   }
 }
 
-template void look(const Mechanism<Planar> &, const PostureWatch &, double, const double *, Workspace<Planar, double> &,
-                   PostureHistory &);
-template void look(const Mechanism<Spatial> &, const PostureWatch &, double, const double *,
-                   Workspace<Spatial, double> &, PostureHistory &);
+template void look(const PostureWatch &, double, const double *, Workspace<Planar, double> &, PostureHistory &);
+template void look(const PostureWatch &, double, const double *, Workspace<Spatial, double> &, PostureHistory &);
 
 } // namespace ffrobot::recursion

@@ -12,32 +12,32 @@ namespace ffrobot::recursion {
 class ZeroOrderHold {
 public:
   // direction (n_v, inputs): generalized forces of a unit of each command
-  explicit ZeroOrderHold(Eigen::MatrixXd direction)
-      : direction_(std::move(direction)), u_(Eigen::VectorXd::Zero(direction_.cols())),
-        force_(Eigen::VectorXd::Zero(direction_.rows())) {}
+  explicit ZeroOrderHold(MatrixXd direction)
+      : direction_(std::move(direction)), u_(VectorXd::Zero(direction_.cols())),
+        force_(VectorXd::Zero(direction_.rows())) {}
 
   // What a motor on frames takes back on the modes of a body, per unit of its command.
-  void add_frame_motor(Eigen::Index input, FrameShare share) { shares_.emplace_back(input, std::move(share)); }
+  void add_frame_motor(Index input, FrameShare share) { shares_.emplace_back(input, std::move(share)); }
 
-  const Eigen::MatrixXd &direction() const { return direction_; }
-  const std::vector<std::pair<Eigen::Index, FrameShare>> &frame_motors() const { return shares_; }
+  const MatrixXd &direction() const { return direction_; }
+  const std::vector<std::pair<Index, FrameShare>> &frame_motors() const { return shares_; }
 
-  void hold(const Eigen::VectorXd &u) {
+  void hold(const VectorXd &u) {
     u_ = u;
     multiply_small(direction_, u_.data(), force_.data());
   }
 
   // Adds them at q to those along v.
   void add(const double *q, double *force) const {
-    Eigen::Map<Eigen::VectorXd>(force, force_.size()) += force_;
+    Map<VectorXd>(force, force_.size()) += force_;
     for (const auto &[input, share] : shares_)
       share.add(u_[input], q, force);
   }
 
 private:
-  Eigen::MatrixXd direction_;
-  std::vector<std::pair<Eigen::Index, FrameShare>> shares_;
-  Eigen::VectorXd u_, force_;
+  MatrixXd direction_;
+  std::vector<std::pair<Index, FrameShare>> shares_;
+  VectorXd u_, force_;
 };
 
 } // namespace ffrobot::recursion

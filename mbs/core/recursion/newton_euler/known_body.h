@@ -5,18 +5,17 @@
 #include "core/recursion/newton_euler/planar_body.h"
 #include "core/recursion/newton_euler/spatial_body.h"
 
-#include <Eigen/Core>
+#include "core/eigen.h"
 
 namespace ffrobot::recursion {
 
 // Of rows of W: W p_ddot, with geometric stiffening less p_dot^T K p_dot
-template <class Body, class State>
-Eigen::VectorXd elastic_accelerations(const Body &b, const State &s, const double *p_ddot) {
+template <class Body, class State> VectorXd elastic_accelerations(const Body &b, const State &s, const double *p_ddot) {
   if (b.n == 0)
-    return Eigen::VectorXd::Zero(b.row_count());
-  Eigen::VectorXd found = rows_of(b, s).lazyProduct(Eigen::Map<const Eigen::VectorXd>(p_ddot, b.n));
+    return VectorXd::Zero(b.row_count());
+  VectorXd found = rows_of(b, s).lazyProduct(Map<const VectorXd>(p_ddot, b.n));
   if (b.stiffening)
-    found -= Eigen::Map<const Eigen::VectorXd>(s.bent.curvature.data(), found.size());
+    found -= Map<const VectorXd>(s.bent.curvature.data(), found.size());
   return found;
 }
 
@@ -25,15 +24,15 @@ template <class Body, class State, class Each>
 void put_on_modes(const Body &b, const State &s, const Each &each, double *modal) {
   if (b.stiffening) {
     const auto W = rows_of(b, s);
-    Eigen::Map<Eigen::VectorXd> sum(modal, b.n);
+    Map<VectorXd> sum(modal, b.n);
     sum.setZero();
-    each([&](Eigen::Index row, double force) { sum += force * W.row(row).transpose(); });
+    each([&](Index row, double force) { sum += force * W.row(row).transpose(); });
   } else
     in_registers(b.n, [&]<int width>(long k) { // the same of rows that are constant
       using Part = Pack<double, width>;
       const double *W = b.rows.data() + k;
       Part sum = Part::zero();
-      each([&](Eigen::Index row, double force) { sum += force * Part::read(W + row * padded(b.n)); });
+      each([&](Index row, double force) { sum += force * Part::read(W + row * padded(b.n)); });
       sum.write(modal + k);
     });
 }
@@ -41,9 +40,9 @@ void put_on_modes(const Body &b, const State &s, const Each &each, double *modal
 // m_ff p_ddot + m^T A - Q_f - sum of P^T f (n). z: by rows of W, -A and forces on ports
 template <class Space, class State>
 void modal_residual(const Node<Space> &node, const double *p, const double *p_ddot, double *z, State &s, double *to) {
-  Eigen::VectorXd by_forces(node.n());
+  VectorXd by_forces(node.n());
   modes<false>(node, p, z, s, by_forces.data());
-  const Eigen::VectorXd beside = Eigen::Map<const Eigen::VectorXd>(p_ddot, node.n()) - by_forces;
+  const VectorXd beside = Map<const VectorXd>(p_ddot, node.n()) - by_forces;
   if (node.body.stiffening)
     s.bent.multiply_mass(beside.data(), to);
   else

@@ -8,9 +8,6 @@
 
 namespace ffrobot::recursion {
 
-using Eigen::Index;
-using Eigen::VectorXd;
-
 namespace {
 
 template <std::size_t n> void add(const std::array<double, n> &x, std::array<double, n> &to, double factor = 1) {
@@ -34,9 +31,9 @@ std::array<double, Space::dim> acceleration_of_joint(const Node<Space> &node, co
     along[node.shape.freedoms.component[k]] = a[k];
   if (node.shape.in_inner_axes) {
     const auto inner = along;
-    to_outer_axes(node, q, inner.data(), along.data());
+    change_section<false>(node, q, inner.data(), along.data());
   }
-  acceleration_from_freedoms(node, hinge, along.data());
+  acceleration_by_freedoms<-1>(node, hinge, along.data());
   return along;
 }
 
@@ -51,10 +48,9 @@ void section_to_global(const Node<Space> &node, const State &s, const double *x,
 
 // What a unit of its multiplier makes of a constraint, or a wrench, at the port where it acts: in axes of that
 template <class Space>
-std::array<double, Space::dim> in_port_axes_of(const Mechanism<Space> &m, const typename Mechanism<Space>::Actions &at,
-                                               const Action &action, const double *wrench,
-                                               const Workspace<Space, double> &w) {
-  const auto &body = m.nodes[at.node].body;
+std::array<double, Space::dim> in_port_axes_of(const typename Mechanism<Space>::Actions &at, const Action &action,
+                                               const double *wrench, const Workspace<Space, double> &w) {
+  const auto &body = w.m.nodes[at.node].body;
   const auto &s = w.bodies[at.node];
   std::array<double, Space::dim> x{};
   if (action.constraint < 0) {
@@ -70,9 +66,9 @@ std::array<double, Space::dim> in_port_axes_of(const Mechanism<Space> &m, const 
     in_port_axes(body, at.port, s, action.force, moment, x.data());
     return x;
   }
-  const Constraint &row = m.constraints[action.constraint];
+  const Constraint &row = w.m.constraints[action.constraint];
   ConstraintMotion<double> motion;
-  constraint_motion(m, row, w, row.moves, motion);
+  constraint_motion(row, w, row.moves, motion);
   in_port_axes(body, at.port, s, motion.force, action.sign > 0 ? motion.moment_b : motion.moment_a, x.data());
   for (double &component : x)
     component *= action.sign;
@@ -93,8 +89,8 @@ NewtonEuler<Space>::NewtonEuler(const Mechanism<Space> &mechanism)
 template <class Space>
 void NewtonEuler<Space>::prepare(const double *q, const double *v, const double *generalized,
                                  Workspace<Space, double> &w) {
-  kinematics(mechanism_, q, v, recursion::Forces<double>{generalized, nullptr}, w);
-  locate(mechanism_, q, w);
+  kinematics(q, v, recursion::Forces<double>{generalized, nullptr}, w);
+  locate(q, w);
   for (std::size_t i = 0; i < mechanism_.nodes.size(); ++i) {
     const Node<Space> &node = mechanism_.nodes[i];
     bodies_[i].take(node.body, q + node.p_q(), v + node.p_v(), w.bodies[i]);
@@ -147,7 +143,7 @@ void NewtonEuler<Space>::load(const double *lambda, const double *wrench, const 
     for (const Action &action : actions.list) {
       const double size = action.constraint < 0 ? wrench != nullptr : lambda ? -lambda[action.constraint] : 0;
       if (size != 0)
-        add(in_port_axes_of<Space>(mechanism_, actions, action, wrench, w), on_ports_[actions.global_port], size);
+        add(in_port_axes_of<Space>(actions, action, wrench, w), on_ports_[actions.global_port], size);
     }
   on_coordinates_.setZero();
   for (std::size_t r = 0; lambda && r < mechanism_.constraints.size(); ++r)
@@ -207,8 +203,8 @@ typename NewtonEuler<Space>::Vector NewtonEuler<Space>::along_joint(std::size_t 
   const Node<Space> &node = mechanism_.nodes[i];
   Vector along = of_joint_[i], found{};
   if (node.shape.in_inner_axes)
-    to_inner_axes(node, q + node.q, of_joint_[i].data(), along.data());
-  forces_to_freedoms(node, w.hinges[i], along.data());
+    change_section<true>(node, q + node.q, of_joint_[i].data(), along.data());
+  forces_by_freedoms<1>(node, w.hinges[i], along.data());
   for (std::size_t k = 0; k < static_cast<std::size_t>(node.shape.freedoms.count); ++k)
     found[k] = along[node.shape.freedoms.component[k]];
   return found;
@@ -287,7 +283,7 @@ void NewtonEuler<Space>::add_joint_moment_on_modes(std::size_t i, double moment,
       return;
     VectorXd modal(node.n());
     put_on_modes(node.body, w.bodies[at], put, modal.data());
-    Eigen::Map<VectorXd>(Q + node.p_v(), node.n()) += modal;
+    Map<VectorXd>(Q + node.p_v(), node.n()) += modal;
   };
   const Node<Space> &node = mechanism_.nodes[i];
   Vector about_z{}, at_port{};
@@ -361,7 +357,7 @@ NewtonEuler<Space>::of_constraint(std::size_t r, const double *a, const Workspac
   const Constraint &row = mechanism_.constraints[r];
   const double along_joint = row.node < 0 ? 0 : row.share * a[mechanism_.nodes[row.node].v + row.freedom];
   ConstraintMotion<double> motion;
-  constraint_motion(mechanism_, row, w, row.moves, motion);
+  constraint_motion(row, w, row.moves, motion);
   double along = 0;
   for (int k = 0; k < Space::linear; ++k)
     along += mechanism_.gravity[k] * motion.force[k];
@@ -372,7 +368,7 @@ NewtonEuler<Space>::of_constraint(std::size_t r, const double *a, const Workspac
     for (const Action &action : actions.list)
       if (action.constraint == static_cast<int>(r)) {
         const std::size_t port = actions.global_port;
-        const Vector x = in_port_axes_of<Space>(mechanism_, actions, action, nullptr, w);
+        const Vector x = in_port_axes_of<Space>(actions, action, nullptr, w);
         found.value += product(x, ports_[port]);
         for (std::size_t k = 0; k < x.size(); ++k)
           found.size += std::abs(x[k]) * (std::abs(ports_[port][k]) + terms_[port]);

@@ -6,7 +6,7 @@
 #include "core/recursion/mechanism/workspace.h"
 #include "core/recursion/newton_euler/known_body.h"
 
-#include <Eigen/Core>
+#include "core/eigen.h"
 
 #include <array>
 
@@ -55,7 +55,7 @@ public:
 
   // After load(): what the loads do on node i alone, (dim + n): force and moment about the origin of its frame, in axes
   // of the body, then generalized forces on its modes.
-  Eigen::VectorXd on_body(std::size_t i, const Workspace<Space, double> &w) const;
+  VectorXd on_body(std::size_t i, const Workspace<Space, double> &w) const;
 
   // Second derivative of the value of a constraint by these accelerations, and the size of the terms that cancel in it.
   struct ConstraintAcceleration {
@@ -75,8 +75,8 @@ public:
   const Vector &of_port(std::size_t port) const { return ports_[port]; }
 
 private:
-  void residual_of_modes(std::size_t i, const double *q, const double *a, Eigen::VectorXd &z,
-                         Workspace<Space, double> &w, double *f);
+  void residual_of_modes(std::size_t i, const double *q, const double *a, VectorXd &z, Workspace<Space, double> &w,
+                         double *f);
   Vector along_joint(std::size_t i, const double *q, const Workspace<Space, double> &w) const;
   // What loads along the coordinates of joint i do to its outer section, in axes of the joint
   Vector loads_along_joint(std::size_t i) const;
@@ -89,7 +89,7 @@ private:
   std::vector<Vector> frames_;                         // of bodies: accelerations, axes of the body
   std::vector<Vector> inertia_;                        // of bodies: (force, moment) at the frame, axes of the body
   std::vector<double> rotor_;                          // rate of spin of the rotor on the inner section, times inertia
-  Eigen::VectorXd on_coordinates_;                     // (n_v) what constraints that are joint coordinates do to these
+  VectorXd on_coordinates_;                            // (n_v) what constraints that are joint coordinates do to these
   std::vector<Vector> of_joint_, at_section_;          // by nodes, in axes of the joint; of the inboard port
   std::vector<Vector> of_rotor_;
 };

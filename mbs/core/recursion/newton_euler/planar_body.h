@@ -3,7 +3,7 @@
 
 #include "core/recursion/kinematics/planar.h"
 
-#include <Eigen/Core>
+#include "core/eigen.h"
 
 #include <array>
 
@@ -23,8 +23,7 @@ inline std::array<double, 2> place(const Port &port, const State<double> &s) {
 }
 
 // Of a port against the frame: what its acceleration has beside the frame's linear one. alpha: of the frame
-inline Vector relative_acceleration(const Port &port, const State<double> &s, double alpha,
-                                    const Eigen::VectorXd &u_ddot) {
+inline Vector relative_acceleration(const Port &port, const State<double> &s, double alpha, const VectorXd &u_ddot) {
   const auto [x, y] = place(port, s);
   const double *u_dot = s.u_dot.data() + port.row, *elastic = u_ddot.data() + port.row;
   const double ww = s.omega * s.omega, w2 = 2 * s.omega;
@@ -33,29 +32,28 @@ inline Vector relative_acceleration(const Port &port, const State<double> &s, do
 }
 
 // Of port i by that of the frame, and back, in axes of the body and of the undeformed port
-inline Vector port_acceleration(const Body &b, int i, const State<double> &s, const Vector &A,
-                                const Eigen::VectorXd &u_ddot) {
+inline Vector port_acceleration(const Body &b, int i, const State<double> &s, const Vector &A, const VectorXd &u_ddot) {
   Vector found = relative_acceleration(b.ports[i], s, A[2], u_ddot);
   for (std::size_t k = 0; k < 3; ++k)
     found[k] += A[k];
   return found;
 }
 inline Vector frame_acceleration(const Body &b, int i, const State<double> &s, const Vector &at_port,
-                                 const Eigen::VectorXd &u_ddot) {
+                                 const VectorXd &u_ddot) {
   const Port &port = b.ports[i];
   const double alpha = at_port[2] - u_ddot[port.row + 2];
   const Vector relative = relative_acceleration(port, s, alpha, u_ddot);
   return {at_port[0] - relative[0], at_port[1] - relative[1], alpha};
 }
 // Of a frame that sits where modes turn the section (Body::TILT)
-inline void tilt_back(const Body &b, const Eigen::VectorXd &u_ddot, Vector &A) {
+inline void tilt_back(const Body &b, const VectorXd &u_ddot, Vector &A) {
   if (b.is_tilted)
     A[2] -= u_ddot[Body::TILT];
 }
 
 // M_rr A + m p_ddot - Q_r: force and moment about the origin of the frame. u_ddot: W p_ddot
 inline Vector inertia_force(const Body &b, const KnownBody &, const State<double> &s, const Vector &A,
-                            const double *p_ddot, const Eigen::VectorXd &u_ddot) {
+                            const double *p_ddot, const VectorXd &u_ddot) {
   const double ww = s.omega * s.omega, w2 = 2 * s.omega;
   const double sx = b.sx + s.u[Body::Sx], sy = b.sy + s.u[Body::Sy];
   double h_p_ddot = u_ddot[Body::H];
@@ -79,7 +77,7 @@ inline void to_port(const Body &b, int i, const State<double> &s, Vector &f) {
 
 // act(row of W, force) of a force on port i; of a moment on a frame that modes turn
 template <class Act> void put_on_rows(const Body &b, int i, const State<double> &, const Vector &f, const Act &act) {
-  for (Eigen::Index k = 0; k < 3; ++k)
+  for (Index k = 0; k < 3; ++k)
     act(b.ports[i].row + k, f[k]);
 }
 template <class Act> void on_tilt(const Body &b, const Vector &f, const Act &act) {

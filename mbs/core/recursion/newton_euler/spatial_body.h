@@ -8,7 +8,7 @@
 
 #include "core/recursion/kinematics/spatial.h"
 
-#include <Eigen/Core>
+#include "core/eigen.h"
 
 #include <array>
 
@@ -28,12 +28,12 @@ struct KnownBody {
       for (int j = 0; j < 6; ++j)
         M(i, j) = packed_M[i][j];
   }
-  Eigen::Matrix<double, 6, 6> M;
-  Eigen::Matrix<double, 6, 1> bias;
+  Matrix<double, 6, 6> M;
+  Matrix<double, 6, 1> bias;
 };
 
 // What a port's acceleration has beside R^T (a + alpha x r; alpha): in axes of the undeformed port
-inline Vector relative_acceleration(const Body &b, int i, const State<double> &s, const Eigen::VectorXd &u_ddot) {
+inline Vector relative_acceleration(const Body &b, int i, const State<double> &s, const VectorXd &u_ddot) {
   const Port &port = b.ports[i];
   const PortMotion<double> &motion = s.ports[i];
   const double *w = s.omega;
@@ -59,8 +59,7 @@ inline Vector relative_acceleration(const Body &b, int i, const State<double> &s
 }
 
 // Of port i by that of the frame, and back, in axes of the body and of the undeformed port
-inline Vector port_acceleration(const Body &b, int i, const State<double> &s, const Vector &A,
-                                const Eigen::VectorXd &u_ddot) {
+inline Vector port_acceleration(const Body &b, int i, const State<double> &s, const Vector &A, const VectorXd &u_ddot) {
   Vector found = relative_acceleration(b, i, s, u_ddot), moved = A;
   double along[3], about[3];
   SpatialTurn<double>::shift(s.ports[i].r, moved.data());
@@ -71,7 +70,7 @@ inline Vector port_acceleration(const Body &b, int i, const State<double> &s, co
   return found;
 }
 inline Vector frame_acceleration(const Body &b, int i, const State<double> &s, const Vector &at_port,
-                                 const Eigen::VectorXd &u_ddot) {
+                                 const VectorXd &u_ddot) {
   const Vector relative = relative_acceleration(b, i, s, u_ddot);
   const Port &port = b.ports[i];
   double rest[6];
@@ -83,22 +82,21 @@ inline Vector frame_acceleration(const Body &b, int i, const State<double> &s, c
   SpatialTurn<double>::shift(back, found.data());
   return found;
 }
-inline void tilt_back(const Body &, const Eigen::VectorXd &, Vector &) {}
+inline void tilt_back(const Body &, const VectorXd &, Vector &) {}
 
 // M_rr A + m p_ddot - Q_r: force and moment about the origin of the frame
 inline Vector inertia_force(const Body &b, const KnownBody &known, const State<double> &s, const Vector &A,
-                            const double *p_ddot, const Eigen::VectorXd &) {
-  const Eigen::Map<const Eigen::Matrix<double, 6, 1>> frame(A.data());
-  Eigen::Matrix<double, 6, 1> f = known.M * frame + known.bias;
+                            const double *p_ddot, const VectorXd &) {
+  const Map<const Matrix<double, 6, 1>> frame(A.data());
+  Matrix<double, 6, 1> f = known.M * frame + known.bias;
   if (b.n) {
-    Eigen::VectorXd z = Eigen::VectorXd::Zero(b.width), d(b.n);
+    VectorXd z = VectorXd::Zero(b.width), d(b.n);
     z.head<6>() = -frame;
     modal_accelerations<false>(b, z.data(), s, d.data());
-    d = Eigen::Map<const Eigen::VectorXd>(p_ddot, b.n) - d;
+    d = Map<const VectorXd>(p_ddot, b.n) - d;
     f += rows_of(b, s).topRows<6>() * d;
     for (std::size_t c = 0; c < b.twists.size() && !b.stiffening; ++c)
-      f.tail<3>() += Eigen::Map<const Eigen::VectorXd>(s.h_change[c].data(), b.n).dot(d) *
-                     Eigen::Map<const Eigen::Vector3d>(b.twists[c].axis + 3);
+      f.tail<3>() += Map<const VectorXd>(s.h_change[c].data(), b.n).dot(d) * Map<const Vector3d>(b.twists[c].axis + 3);
   }
   return {f[0], f[1], f[2], f[3], f[4], f[5]};
 }

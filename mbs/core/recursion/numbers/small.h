@@ -54,6 +54,20 @@ template <class A, class B, class C> FFROBOT_INLINE void product(const A &a, con
       c[i][j] = found[i][j];
 }
 
+// to = R, whose numbers may be of another kind
+template <class M, class T> FFROBOT_INLINE void assign(const M &R, T (&to)[3][3]) {
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      if constexpr (requires { R(i, j); })
+        to[i][j] = T(R(i, j));
+      else
+        to[i][j] = T(R[i][j]);
+}
+template <class T> FFROBOT_INLINE void assign_turn_about_z(const T &c, const T &s, T (&to)[3][3]) {
+  const T zero(0.), R[3][3] = {{c, -s, zero}, {s, c, zero}, {zero, zero, T(1.)}};
+  assign(R, to);
+}
+
 // Rotation vector x of R = exp(x~), which is no half turn
 template <class M, class X> FFROBOT_INLINE void logarithm(const M &R, X *x) {
   for (int i = 0; i < 3; ++i)

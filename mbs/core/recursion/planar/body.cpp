@@ -6,21 +6,18 @@
 
 namespace ffrobot::recursion::planar {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-
-PlanarData moved(const PlanarData &data, const Eigen::Vector2d &position, double angle) {
+PlanarData moved(const PlanarData &data, const Vector2d &position, double angle) {
   PlanarData to = data;
-  const Eigen::Matrix2d R = Eigen::Rotation2D<double>(-angle).toRotationMatrix();
+  const Matrix2d R = Eigen::Rotation2D<double>(-angle).toRotationMatrix();
   const double x = position.x(), y = position.y();
   to.first_moment = R * (data.first_moment - data.mass * position);
   to.inertia = data.inertia - 2 * position.dot(data.first_moment) + data.mass * position.squaredNorm();
   const Index n = data.modes();
   if (n) {
     to.S_bar = R * data.S_bar;
-    to.h = (data.h.size() ? data.h : Eigen::VectorXd::Zero(n)) - x * data.S_bar.row(1).transpose() +
+    to.h = (data.h.size() ? data.h : VectorXd::Zero(n)) - x * data.S_bar.row(1).transpose() +
            y * data.S_bar.row(0).transpose();
-    to.j = (data.j.size() ? data.j : Eigen::VectorXd::Zero(n)) - data.S_bar.transpose() * position;
+    to.j = (data.j.size() ? data.j : VectorXd::Zero(n)) - data.S_bar.transpose() * position;
   }
   to.K = moved_K(data, position, R);
   for (PlanarMarker &marker : to.markers) {
@@ -36,7 +33,7 @@ PlanarData moved(const PlanarData &data, const Eigen::Vector2d &position, double
 namespace {
 
 // a - x . y, summed in extended precision: what is left after elimination is a small part of a
-double less(double a, const Eigen::RowVectorXd &x, const Eigen::RowVectorXd &y) {
+double less(double a, const RowVectorXd &x, const RowVectorXd &y) {
   long double sum = a;
   for (Index i = 0; i < x.size(); ++i)
     sum -= static_cast<long double>(x[i]) * y[i];

@@ -43,8 +43,8 @@ struct Body {
   bool is_damped = false;   // by a diagonal
   std::vector<Port> ports;
   // Where these are not empty, an evaluation takes the long way round: modal forces one by one.
-  Eigen::MatrixXd D_full, S_tilde, m_xy;
-  Eigen::VectorXd j;
+  MatrixXd D_full, S_tilde, m_xy;
+  VectorXd j;
   std::shared_ptr<const Stiffening> stiffening; // null without
   bool has_more = false;                        // any of these
   bool is_tilted = false;                       // has row TILT
@@ -55,12 +55,12 @@ struct Body {
 
 private:
   void fill_rows(const PlanarData &data, const std::vector<int> &used, int tilted);
-  void fill_layouts(const Eigen::MatrixXd &W);
-  void fill_products(const Eigen::MatrixXd &W);
+  void fill_layouts(const MatrixXd &W);
+  void fill_products(const MatrixXd &W);
 };
 
 // The same body with its frame at `position`, turned by `angle`.
-PlanarData moved(const PlanarData &data, const Eigen::Vector2d &position, double angle);
+PlanarData moved(const PlanarData &data, const Vector2d &position, double angle);
 
 template <class T> struct Inertia {
   T xx, xy, xa, yy, ya, aa; // M_rr - m m^T

@@ -8,11 +8,6 @@
 
 namespace ffrobot::recursion::planar {
 
-using Eigen::Index;
-using Eigen::Matrix2d;
-using Eigen::MatrixXd;
-using Eigen::Vector2d;
-
 namespace {
 
 // What of K of its markers is nothing but rounding
@@ -64,10 +59,9 @@ Stiffening::Stiffening(const PlanarData &data, const std::vector<int> &used, con
   const Vector2d g_0 = root_mass * center;
   g[0] = g_0.x(), g[1] = g_0.y(), g[2] = root_J;
 
-  const Eigen::RowVectorXd none = Eigen::RowVectorXd::Zero(n);
-  const auto or_none = [&](const Eigen::VectorXd &x) { return x.size() ? Eigen::RowVectorXd(x.transpose()) : none; };
-  std::array<Eigen::RowVectorXd, fields> with_modes{data.S_bar.row(0), data.S_bar.row(1), or_none(data.j),
-                                                    or_none(data.h)};
+  const RowVectorXd none = RowVectorXd::Zero(n);
+  const auto or_none = [&](const VectorXd &x) { return x.size() ? RowVectorXd(x.transpose()) : none; };
+  std::array<RowVectorXd, fields> with_modes{data.S_bar.row(0), data.S_bar.row(1), or_none(data.j), or_none(data.h)};
   std::array<MatrixXd, fields> with_G;
   std::copy_n(data.K.begin(), fields, with_G.begin());
   move(center, with_modes), move(center, with_G);

@@ -16,7 +16,7 @@
 #include "core/recursion/model.h"
 #include "core/recursion/spatial/mode_matrix.h"
 
-#include <Eigen/Core>
+#include "core/eigen.h"
 
 namespace ffrobot::recursion::planar {
 
@@ -43,9 +43,9 @@ struct Stiffening {
 bool is_curved(const PlanarData &data, const PlanarMarker &marker, int component);
 
 // x_k = R_kl y_l of matrices
-std::vector<Eigen::MatrixXd> turned(const Eigen::Matrix2d &R, const std::vector<Eigen::MatrixXd> &y);
+std::vector<MatrixXd> turned(const Matrix2d &R, const std::vector<MatrixXd> &y);
 
 // K of data about another point, along other axes: those that R turns into (x, y)
-std::vector<Eigen::MatrixXd> moved_K(const PlanarData &data, const Eigen::Vector2d &position, const Eigen::Matrix2d &R);
+std::vector<MatrixXd> moved_K(const PlanarData &data, const Vector2d &position, const Matrix2d &R);
 
 } // namespace ffrobot::recursion::planar

@@ -77,7 +77,7 @@ template <class T> struct BentModes {
 };
 
 // W at p (width, n), of a state whose inertia is known
-template <class Body, class State> Eigen::Map<const Eigen::MatrixXd> rows_of(const Body &b, const State &s) {
+template <class Body, class State> Map<const MatrixXd> rows_of(const Body &b, const State &s) {
   return {b.stiffening ? s.bent.rows.data() : b.constant_rows(), b.row_count(), b.n};
 }
 

@@ -4,11 +4,7 @@
 
 namespace ffrobot::recursion::spatial {
 
-using Eigen::Index;
-using Eigen::Matrix3d;
-using Eigen::MatrixXd;
-using Eigen::Vector3d;
-using ExtendedMatrix = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
+using ExtendedMatrix = Matrix<long double, Dynamic, Dynamic>;
 
 namespace {
 
@@ -37,7 +33,7 @@ MatrixXd symmetric_I_bar(const SpatialData &data) {
   Index s = 0;
   for (int a = 0; a < 3; ++a)
     for (int b = a; b < 3; ++b, ++s) {
-      const Eigen::RowVectorXd row = 0.5 * (I.row(3 * a + b) + I.row(3 * b + a));
+      const RowVectorXd row = 0.5 * (I.row(3 * a + b) + I.row(3 * b + a));
       if (row.cwiseAbs().maxCoeff() > negligible * size)
         g.row(s) = row;
     }
@@ -217,7 +213,7 @@ void Body::fill_residuals(const SpatialData &data, const std::vector<int> &used)
   };
   const Matrix3d inertia =
       data.J2.trace() * Matrix3d::Identity() - data.J2 + data.J_spin * data.spin_axis * data.spin_axis.transpose();
-  Eigen::Matrix<double, 6, 6> M;
+  Matrix<double, 6, 6> M;
   M << mass * Matrix3d::Identity(), -tilde(data.first_moment), tilde(data.first_moment), inertia;
   for (int r = 0; r < 6; ++r)
     for (int c = 0; c < 6; ++c)
@@ -228,7 +224,7 @@ void Body::fill_residuals(const SpatialData &data, const std::vector<int> &used)
   for (std::size_t i = 0; i < ports.size(); ++i) {
     const SpatialMarker &marker = data.markers[used[i]];
     const Matrix3d R = marker.triad.transpose();
-    Eigen::Matrix<double, 6, 6> X;
+    Matrix<double, 6, 6> X;
     X << R, -R * tilde(marker.position), Matrix3d::Zero(), R;
     for (int r = 0; r < 6; ++r)
       for (int c = 0; c < 6; ++c)
@@ -237,7 +233,7 @@ void Body::fill_residuals(const SpatialData &data, const std::vector<int> &used)
 }
 
 // The row of W that is g from now on
-int Body::add_to_W(const Eigen::VectorXd &g) {
+int Body::add_to_W(const VectorXd &g) {
   const auto count = std::count_if(stretches.begin(), stretches.end(), [](const Stretch &s) { return s.g_row >= 0; });
   const int row = lanes * static_cast<int>(count / 2) + 6 + static_cast<int>(count % 2);
   for (int k = 0; k < n; ++k)
@@ -246,7 +242,7 @@ int Body::add_to_W(const Eigen::VectorXd &g) {
 }
 
 // T_s, g_s and G_s; returned is s, -1 where these modes do not stretch
-int Body::add_stretch(const Matrix3d &T, const MatrixXd &G, const Eigen::VectorXd &g) {
+int Body::add_stretch(const Matrix3d &T, const MatrixXd &G, const VectorXd &g) {
   Stretch of;
   const bool has_g = !g.isZero(0);
   of.G = ModeMatrix(G);

@@ -22,11 +22,9 @@
 
 namespace ffrobot::recursion::spatial {
 
-using Matrix = double[3][3];
-
 struct Port {
   double r[3] = {};              // undeformed, body axes
-  Matrix R = {};                 // its axes, undeformed: columns
+  double R[3][3] = {};           // its axes, undeformed: columns
   int row = 8;                   // its first in W
   double T[6][lanes] = {};       // X - P m^T of the undeformed body; with geometric stiffening, X
   double turning[3][lanes] = {}; // axes of the section, in the place of alpha
@@ -64,7 +62,7 @@ struct Body {
   Aligned<double> G;              // (width, width) W W^T
   Aligned<double> K, D;           // (padded n) stiffness; damping where it is diagonal
   bool is_damped = false;
-  Eigen::MatrixXd D_full; // damping where it is not diagonal
+  MatrixXd D_full; // damping where it is not diagonal
   std::vector<Port> ports;
   std::vector<Stretch> stretches;               // at most six
   double tension[6][lanes] = {};                // of w_x^2, w_y^2, w_z^2, w_x w_y, w_y w_z, w_z w_x: by stretches
@@ -77,17 +75,17 @@ struct Body {
 
 private:
   bool is_curved(int row) const;
-  void fill_rows(const SpatialData &data, const std::vector<int> &used, const Eigen::MatrixXd &I_bar);
+  void fill_rows(const SpatialData &data, const std::vector<int> &used, const MatrixXd &I_bar);
   void fill_residuals(const SpatialData &data, const std::vector<int> &used);
-  void fill_tensors(const SpatialData &data, const Eigen::Matrix3d &axes, const Eigen::MatrixXd &g);
-  int add_to_W(const Eigen::VectorXd &g);
-  int add_stretch(const Eigen::Matrix3d &T, const Eigen::MatrixXd &G, const Eigen::VectorXd &g);
+  void fill_tensors(const SpatialData &data, const Matrix3d &axes, const MatrixXd &g);
+  int add_to_W(const VectorXd &g);
+  int add_stretch(const Matrix3d &T, const MatrixXd &G, const VectorXd &g);
 };
 
 // The same body with its frame at `position`, its axes the columns of `triad`.
-SpatialData moved(const SpatialData &data, const Eigen::Vector3d &position, const Eigen::Matrix3d &triad);
+SpatialData moved(const SpatialData &data, const Vector3d &position, const Matrix3d &triad);
 
 // K of a marker along its axes, six or none
-std::vector<Eigen::MatrixXd> section_K(const SpatialMarker &marker);
+std::vector<MatrixXd> section_K(const SpatialMarker &marker);
 
 } // namespace ffrobot::recursion::spatial

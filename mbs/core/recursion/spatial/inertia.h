@@ -27,8 +27,8 @@ template <class T> FFROBOT_INLINE void modal_forces(const Body &b, int n, const 
   if (force)
     for (int k = 0; k < b.n; ++k)
       s.Q_f[k] += force[k];
-  for (Eigen::Index k = 0; k < b.D_full.rows(); ++k)
-    for (Eigen::Index j = 0; j < b.n; ++j)
+  for (Index k = 0; k < b.D_full.rows(); ++k)
+    for (Index j = 0; j < b.n; ++j)
       s.Q_f[k] -= b.D_full(k, j) * s.v[j];
 }
 

@@ -4,8 +4,8 @@ namespace ffrobot::recursion {
 
 // Full where its columns, three instructions for eight entries, cost less than its entries one by one, five for each
 // and five for a row.
-ModeMatrix::ModeMatrix(const Eigen::MatrixXd &given, double rounding) : n(static_cast<int>(given.rows())) {
-  const Eigen::MatrixXd M = (given.array().abs() > rounding).select(given, 0.0);
+ModeMatrix::ModeMatrix(const MatrixXd &given, double rounding) : n(static_cast<int>(given.rows())) {
+  const MatrixXd M = (given.array().abs() > rounding).select(given, 0.0);
   const int filled = static_cast<int>((M.array() != 0).count());
   if (filled == 0)
     return;
@@ -33,9 +33,9 @@ ModeMatrix::ModeMatrix(const Eigen::MatrixXd &given, double rounding) : n(static
   first.push_back(static_cast<int>(column.size()));
 }
 
-double largest_of(const std::vector<Eigen::MatrixXd> &all) {
+double largest_of(const std::vector<MatrixXd> &all) {
   double largest = 0;
-  for (const Eigen::MatrixXd &K : all)
+  for (const MatrixXd &K : all)
     largest = std::max(largest, K.size() ? K.cwiseAbs().maxCoeff() : 0.0);
   return largest;
 }

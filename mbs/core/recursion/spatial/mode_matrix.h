@@ -6,7 +6,7 @@
 
 #include "core/recursion/numbers/pack.h"
 
-#include <Eigen/Core>
+#include "core/eigen.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -82,7 +82,7 @@ template <class T> FFROBOT_INLINE void read_modes(const T *from, int n, T *to) {
 struct ModeMatrix {
   enum class Kind { zero, diagonal, sparse, full };
   ModeMatrix() = default;
-  explicit ModeMatrix(const Eigen::MatrixXd &M, double rounding = 0); // entries up to that count as zero
+  explicit ModeMatrix(const MatrixXd &M, double rounding = 0); // entries up to that count as zero
 
   Kind kind = Kind::zero;
   int n = 0;
@@ -91,11 +91,11 @@ struct ModeMatrix {
   std::vector<int> column;
 };
 
-double largest_of(const std::vector<Eigen::MatrixXd> &all); // entry of these, 0 of none
+double largest_of(const std::vector<MatrixXd> &all); // entry of these, 0 of none
 
 // Stiffness and damping of the modes of a body, which has K, D, is_damped and, for what is no diagonal, D_full
 template <class Data, class Body> void take_damping(const Data &data, Body &body) {
-  const Eigen::MatrixXd &D = data.damping;
+  const MatrixXd &D = data.damping;
   body.K.assign(padded(body.n), 0.0), body.D = body.K;
   std::copy_n(data.stiffness.data(), body.n, body.K.begin());
   if (body.n == 0 || D.size() == 0 || D.isZero(0))

@@ -8,7 +8,6 @@
 namespace ffrobot::recursion::spatial {
 
 using Eigen::Matrix4d;
-using Eigen::MatrixXd;
 
 namespace {
 
@@ -70,20 +69,20 @@ void Stiffening::project(const SpatialData &data) {
   std::vector<MatrixXd> all_K;
   F.assign(3 * fields * stride, 0.0);
   for (int c = 0; c < 3; ++c) {
-    std::array<Eigen::RowVectorXd, 4> with_modes;
+    std::array<RowVectorXd, 4> with_modes;
     std::array<MatrixXd, 4> with_G;
     with_modes[0] = data.S_bar.row(c), with_G[0] = data.K_s[c];
     for (int k = 0; k < 3; ++k) {
       const std::size_t slot = 3 * k + c;
-      with_modes[slot / 3 + 1] = data.I_bar.size() ? Eigen::RowVectorXd(data.I_bar.row(3 * k + c))
-                                                   : Eigen::RowVectorXd(Eigen::RowVectorXd::Zero(n));
+      with_modes[slot / 3 + 1] =
+          data.I_bar.size() ? RowVectorXd(data.I_bar.row(3 * k + c)) : RowVectorXd(RowVectorXd::Zero(n));
       with_G[slot / 3 + 1] = data.K_x[slot];
     }
     const auto F_c = by_fields(orthonormal_fields, with_modes);
     const auto K_c = by_fields(orthonormal_fields, with_G);
     for (int f = 0; f < fields; ++f) {
       g[c][f] = orthonormal_fields.L(1 + c, f);
-      for (Eigen::Index j = 0; j < n; ++j)
+      for (Index j = 0; j < n; ++j)
         F[(c * fields + f) * stride + j] = F_c[f][j];
       all_K.push_back(K_c[f]);
     }
@@ -92,13 +91,13 @@ void Stiffening::project(const SpatialData &data) {
   const double limit = negligible * largest_of(all_K);
   for (std::size_t i = 0; i < all_K.size(); ++i) {
     K.emplace_back(all_K[i], limit);
-    const Eigen::Map<const Eigen::VectorXd> F_i(row(static_cast<int>(i), static_cast<int>(n)), n);
+    const Map<const VectorXd> F_i(row(static_cast<int>(i), static_cast<int>(n)), n);
     if (K.back().kind != ModeMatrix::Kind::zero)
       rest -= F_i * F_i.transpose();
   }
   m_ff_rest.assign(n * stride, 0.0);
-  for (Eigen::Index i = 0; i < n; ++i)
-    for (Eigen::Index j = 0; j < n; ++j)
+  for (Index i = 0; i < n; ++i)
+    for (Index j = 0; j < n; ++j)
       m_ff_rest[i * stride + j] = rest(i, j);
 }
 

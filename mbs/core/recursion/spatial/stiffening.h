@@ -17,7 +17,7 @@
 #include "core/recursion/model.h"
 #include "core/recursion/spatial/mode_matrix.h"
 
-#include <Eigen/Core>
+#include "core/eigen.h"
 
 namespace ffrobot::recursion::spatial {
 
