@@ -1,7 +1,6 @@
 #include "core/analysis/allocation.h"
 
 #include <nanobind/eigen/dense.h>
-#include <nanobind/nanobind.h>
 
 #include "bindings/bindings.h"
 

@@ -1,6 +1,9 @@
 #pragma once
 
+#include "core/archive.h"
+#include "core/check_index.h"
 #include "core/eigen.h"
+
 #include <cstring>
 #include <functional>
 #include <nanobind/nanobind.h>
@@ -15,6 +18,7 @@ namespace nb = nanobind;
 using namespace nb::literals;
 using namespace ffrobot;
 using namespace ffrobot::recursion;
+
 // One function per folder of the core, in a file of that name; module.cpp calls them. Default arguments live in Python,
 // never here: only what may be absent is None.
 void bind_time_function(nb::module_ &m);
@@ -56,17 +60,19 @@ template <class T> void bind_fields(nb::class_<T> bound) {
   });
 }
 
+// Bytes of objects with `fields`, and objects of such bytes, which are to be those of this program.
+template <class T> void bind_bytes(nb::class_<T> &bound) {
+  bound.def("to_bytes", [](const T &x) {
+    const std::string bytes = to_bytes(x);
+    return nb::bytes(bytes.data(), bytes.size());
+  });
+  bound.def_static("of_bytes", [](const nb::bytes &bytes) { return of_bytes<T>({bytes.c_str(), bytes.size()}); });
+}
+
 // `call`, which has to outlive it, from where the interpreter is released: holds it meanwhile.
 template <class R, class... A> auto locked(const std::function<R(A...)> &call) {
   return [&call](A... a) -> R {
     const nb::gil_scoped_acquire held;
     return call(std::forward<A>(a)...);
   };
-}
-
-// Raises ValueError with both sizes where they differ.
-inline void check_size(const char *name, Index got, Index expected) {
-  if (got != expected)
-    throw nb::value_error(
-        (std::string(name) + ": expected size " + std::to_string(expected) + ", got " + std::to_string(got)).c_str());
 }

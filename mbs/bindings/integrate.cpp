@@ -1,14 +1,10 @@
 #include "core/integrate/integrate.h"
 
+#include "bindings/bindings.h"
+
 #include <nanobind/eigen/dense.h>
-#include <nanobind/nanobind.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
-
-#include <stdexcept>
-
-#include "bindings/archived.h"
-#include "bindings/bindings.h"
 
 namespace {
 

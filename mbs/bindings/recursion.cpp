@@ -12,7 +12,6 @@
 #include <nanobind/stl/vector.h>
 
 #include <chrono>
-#include <optional>
 
 #include "bindings/recursion/known_motion.h"
 

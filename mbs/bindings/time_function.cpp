@@ -1,11 +1,6 @@
 #include "core/time_function/time_function.h"
 
-#include <cstdint>
-#include <functional>
-#include <tuple>
-
 #include <nanobind/eigen/dense.h>
-#include <nanobind/nanobind.h>
 #include <nanobind/stl/function.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>

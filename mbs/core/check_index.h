@@ -17,4 +17,11 @@ template <class Number, class Count> void check_index(std::string_view name, Num
                                 std::to_string(number));
 }
 
+// The same of sizes
+inline void check_size(std::string_view name, Index got, Index expected) {
+  if (got != expected)
+    throw std::invalid_argument(std::string(name) + ": expected size " + std::to_string(expected) + ", got " +
+                                std::to_string(got));
+}
+
 } // namespace ffrobot

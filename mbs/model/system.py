@@ -334,7 +334,7 @@ class FrameShare(NamedTuple):
 def frame_share(model: Model, joint: str, q: Array) -> FrameShare:
     """The share −Φ_rᵀ J_l(φ) z of both sections, turned by φ = Φ_r p, for a revolute joint's motor at q (n_q,).
 
-    Why: core/recursion/motion/frame_motor.h.
+    Why: core/recursion/motion/zero_order_hold.h.
     """
     tree = model.tree
     direction, slope = np.zeros(tree.n_v), np.zeros((tree.n_v, tree.n_v))

@@ -102,7 +102,7 @@ FAULTS = [
           "free * path.null_space(followed() + 1)", TREE),
     Fault(RECURSION + "motion/independent_constraints.cpp", "slight * largest", "0 * largest",
           MBS + "recursion/test_motion.py"),
-    Fault(CORE + "/linear/singular_values.cpp", "values[rank - 1] / values[0]", "values[rank - 1]", TREE),
+    Fault(CORE + "/linear/dense.cpp", "values[rank - 1] / values[0]", "values[rank - 1]", TREE),
 ]  # fmt: skip
 
 

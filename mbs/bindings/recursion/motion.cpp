@@ -1,6 +1,4 @@
 // Motions of mechanisms in joint coordinates: mbs/core/recursion/motion/motion.h.
-#include "core/recursion/motion/motion.h"
-#include "core/integrate/integrate.h"
 #include "core/recursion/inverse/motors.h"
 
 #include <nanobind/stl/complex.h>
@@ -33,8 +31,8 @@ TreeRun motion_of(const Model<Space> &model, const Scene &scene, const std::vect
     check_size("state of the checkpoint", checkpoint->integration.state.size(), q.size() + v.size());
     motion.go_on(checkpoint->history);
   }
-  return integrated(model, scene, motion, reader, times, q, v, controls, carry_on, recording, nullptr, checkpoint,
-                    samples, replay);
+  return integrated(model, scene, motion, reader, times, q, v, controls, carry_on,
+                    {.recording = recording, .samples = samples}, checkpoint, replay);
 }
 
 template <class Space>
@@ -128,7 +126,7 @@ void bind_run(nb::module_ &m) {
   auto run = nb::class_<TreeRun>(m, "TreeRun", "A motion in joint coordinates at outputs, as far as it got.");
   bind_report(run);
   run.def_ro("least_ratio", &TreeRun::least_ratio,
-             "Of the scene's watch: 1 without; see mbs/core/recursion/motion/singular_posture.h.")
+             "Of the scene's watch: 1 without; see mbs/core/recursion/motion/mobility.h.")
       .def_ro("singular_at", &TreeRun::singular_at, "When that was, s.")
       .def_ro("singular_posture", &TreeRun::singular_posture, "(n_q) q there; empty without a watch.")
       .def_prop_ro(

@@ -7,10 +7,6 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
-#include <limits>
-#include <string>
-#include <utility>
-
 #include "bindings/recursion/known_motion.h"
 
 namespace {

@@ -3,7 +3,6 @@
 #include "core/recursion/motion/motion.h"
 
 #include <nanobind/eigen/dense.h>
-#include <nanobind/nanobind.h>
 
 #include "bindings/bindings.h"
 

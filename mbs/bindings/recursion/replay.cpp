@@ -6,8 +6,6 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
-#include <string>
-
 #include "bindings/recursion/tree_run.h"
 
 namespace {

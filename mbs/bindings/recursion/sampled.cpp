@@ -37,7 +37,8 @@ TreeRun sampled_motion_of(const Model<Space> &model, const Scene &scene, const s
   };
   const Sampling sampling{samples, delay, command, hold};
   const Breaks breaks = sampled_breaks(sampling, times.back());
-  return integrated(model, scene, motion, reader, times, q, v, controls, carry_on, nullptr, &breaks, nullptr, between);
+  return integrated(model, scene, motion, reader, times, q, v, controls, carry_on,
+                    {.breaks = &breaks, .samples = between});
 }
 
 template <class Space>
@@ -73,8 +74,7 @@ void bind_tree_sampled(nb::module_ &m) {
             held.add_frame_motor(input, {q, v, rotation, axis});
           },
           "input"_a, "q"_a, "v"_a, "rotation"_a, "axis"_a,
-          "What a motor that turns the frame of a body takes back on its modes: see "
-          "core/recursion/motion/frame_motor.h.");
+          "What a motor that turns the frame of a body takes back on its modes: FrameShare there.");
   bind_sampled_motion<Planar>(m);
   bind_sampled_motion<Spatial>(m);
 }

@@ -1,13 +1,7 @@
 // Forces of the user's, of how points move: mbs/core/recursion/constrained_aba/point_force.h.
-#include "core/recursion/constrained_aba/point_force.h"
 
 #include <nanobind/stl/function.h>
 #include <nanobind/stl/vector.h>
-
-#include <algorithm>
-#include <cstdint>
-#include <functional>
-#include <vector>
 
 #include "bindings/recursion/recursion.h"
 

@@ -1,18 +1,11 @@
 // What a motion in joint coordinates is at outputs, and what its scene has to be like.
 #pragma once
 
-#include "bindings/archived.h"
 #include "bindings/recursion/recursion.h"
 #include "core/analysis/replay.h"
 #include "core/check_index.h"
 #include "core/integrate/integrate.h"
-#include "core/recursion/motion/motion.h"
 #include "core/recursion/motion/postures.h"
-
-#include <algorithm>
-#include <functional>
-#include <optional>
-#include <vector>
 
 namespace ffrobot::recursion {
 
@@ -156,14 +149,15 @@ template <class Space>
 TreeRun integrated(const Model<Space> &model, const Scene &scene, RecursiveMotion<Space> &motion,
                    RecursiveMotion<Space> &reader, const std::vector<double> &times, const VectorXd &q,
                    const VectorXd &v, const IntegrationControls &controls, const std::function<bool(double)> &carry_on,
-                   Recording *recording, const Breaks *breaks, TreeCheckpoint *checkpoint, Samples *samples,
-                   const Replay *replay = nullptr) {
+                   Companions with, TreeCheckpoint *checkpoint = nullptr, const Replay *replay = nullptr) {
   TreeRun run(model, times.size());
   run.last << q, v;
   motion.plan(times.front(), times.back());
   std::optional<LimitWatch> limits; // the reader is free while a step is looked at
   if (!scene.limits.empty())
-    limits.emplace(scene.limits, motion, reader);
+    with.limits = &limits.emplace(scene.limits, motion, reader);
+  if (checkpoint)
+    with.checkpoint = &checkpoint->integration;
   if (checkpoint && checkpoint->integration.has_begun()) {
     check_size("ranges of coordinates", checkpoint->ranges.size(), scene.limits.size());
     if (limits)
@@ -174,8 +168,7 @@ TreeRun integrated(const Model<Space> &model, const Scene &scene, RecursiveMotio
       [&](std::size_t i, double t, const double *state) {
         run.evaluate(i, t, state, reader, model.mechanism.n_q, true, replay);
       },
-      locked(carry_on), recording, breaks, checkpoint ? &checkpoint->integration : nullptr, limits ? &*limits : nullptr,
-      samples);
+      locked(carry_on), with);
   if (limits)
     run.ranges = limits->seen();
   if (checkpoint)

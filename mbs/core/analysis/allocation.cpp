@@ -1,6 +1,6 @@
 #include "core/analysis/allocation.h"
 
-#include "core/linear/singular_values.h"
+#include "core/linear/dense.h"
 #include "core/linear/small_product.h"
 
 #include <algorithm>

@@ -1,10 +1,7 @@
 #include "core/analysis/found_forces.h"
 
-#include "core/linear/products.h"
-#include "core/linear/small_product.h"
+#include "core/linear/dense.h"
 #include "core/recursion/constrained_aba/once.h"
-
-#include <algorithm>
 
 namespace ffrobot::recursion {
 

@@ -7,8 +7,6 @@
 #include "core/integrate/recorded_motion.h"
 #include "core/recursion/inverse/prescribed_motion.h"
 
-#include <memory>
-
 namespace ffrobot::recursion {
 
 // What is read of a state.

@@ -3,9 +3,6 @@
 
 #include "core/analysis/force_source.h"
 #include "core/recursion/motion/motion.h"
-#include "core/recursion/motion/zero_order_hold.h"
-
-#include <memory>
 
 namespace ffrobot::recursion {
 

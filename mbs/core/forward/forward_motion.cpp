@@ -2,9 +2,6 @@
 
 #include "core/archive.h"
 
-#include <algorithm>
-#include <utility>
-
 namespace ffrobot {
 
 namespace {
@@ -81,7 +78,7 @@ IntegrationStatus ForwardMotion::step(double t, double h) {
   outputs_are_old_ = true;
   const IntegrationReport report = integrate(
       *motion_, {t, t + h}, y_, controls, [](std::size_t, double, const double *) {}, [](double) { return true; },
-      nullptr, nullptr, &history_);
+      {.checkpoint = &history_});
   return report.status;
 }
 

@@ -1,14 +1,8 @@
 // The motion of a robot in space under inputs that are held over steps, without Python: what an FMU runs.
 #pragma once
 
-#include "core/fields.h"
 #include "core/integrate/integrate.h"
 #include "core/recursion/inverse/observe.h"
-#include "core/recursion/motion/motion.h"
-
-#include <optional>
-#include <string>
-#include <vector>
 
 namespace ffrobot {
 

@@ -3,7 +3,6 @@
 
 #include "core/integrate/integrate.h"
 
-#include <algorithm>
 #include <cmath>
 
 namespace ffrobot {

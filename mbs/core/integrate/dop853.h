@@ -4,7 +4,6 @@
 #include "core/integrate/dop853_tableau.h"
 #include "core/integrate/explicit_method.h"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 

@@ -4,7 +4,6 @@
 #include "core/integrate/dopri5_tableau.h"
 #include "core/integrate/explicit_method.h"
 
-#include <algorithm>
 #include <cmath>
 
 namespace ffrobot {

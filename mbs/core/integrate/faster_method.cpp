@@ -1,6 +1,5 @@
 #include "core/integrate/faster_method.h"
 
-#include <algorithm>
 #include <utility>
 
 namespace ffrobot {

@@ -1,10 +1,7 @@
 // Which of two methods gets further for the same work, found out while an integration runs.
 #pragma once
 
-#include "core/fields.h"
 #include "core/integrate/method.h"
-
-#include <vector>
 
 namespace ffrobot {
 

@@ -3,15 +3,10 @@
 #include "core/integrate/delivery.h"
 #include "core/integrate/jump.h"
 #include "core/integrate/rounding.h"
-#include "core/integrate/step_control.h"
 #include "core/integrate/step_limit.h"
 #include "core/integrate/watch.h"
 
-#include <algorithm>
-#include <cmath>
 #include <iterator>
-#include <memory>
-#include <optional>
 #include <stdexcept>
 
 namespace ffrobot {
@@ -60,16 +55,15 @@ class Integration {
 public:
   Integration(OdeSystem &system, const std::vector<double> &times, const VectorXd &y,
               const IntegrationControls &controls, const StateFunctionOfTime &output,
-              const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks,
-              LimitWatch *limits, Samples *samples)
-      : system_(system), controls_(controls), breaks_(breaks), limit_watch_(limits),
-        delivery_(system, times, output, recording, samples),
+              const std::function<bool(double)> &carry_on, const Companions &with)
+      : system_(system), controls_(controls), breaks_(with.breaks), limit_watch_(with.limits),
+        delivery_(system, times, output, with.recording, with.samples),
         watch_(system, times.front(), times.back(), controls.max_steps, carry_on),
         step_limit_(system, times.front(), times.back(), controls.tolerance),
         methods_(controls.methods, times.front(), times.back()), method_(make_method(methods_.at_work(), system)),
         control_(method_->error_order()), t_(times.front()), end_(times.back()),
         duration_(times.back() - times.front()), rounding_(system), z_(system.size()), error_(system.size()) {
-    is_repeatable_ = !breaks && !method_->lands_on_outputs();
+    is_repeatable_ = !breaks_ && !method_->lands_on_outputs();
     system_.local().set_centre(y.data());
     system_.local().from_state(y.data(), z_.data());
   }
@@ -381,15 +375,15 @@ const MethodChoice &Recording::method_of(std::size_t step) const {
 
 IntegrationReport integrate(OdeSystem &system, const std::vector<double> &times, VectorXd &y,
                             const IntegrationControls &controls, const StateFunctionOfTime &output,
-                            const std::function<bool(double)> &carry_on, Recording *recording, const Breaks *breaks,
-                            IntegrationCheckpoint *checkpoint, LimitWatch *limits, Samples *samples) {
-  Integration integration(system, times, y, controls, output, carry_on, recording, breaks, limits, samples);
+                            const std::function<bool(double)> &carry_on, const Companions &with) {
+  Integration integration(system, times, y, controls, output, carry_on, with);
+  IntegrationCheckpoint *checkpoint = with.checkpoint;
   if (checkpoint && checkpoint->has_begun())
     integration.go_on(*checkpoint);
   else
     integration.begin();
-  if (recording)
-    recording->tolerance = controls.tolerance;
+  if (with.recording)
+    with.recording->tolerance = controls.tolerance;
   const IntegrationReport report = integration.run();
   y = integration.final_state();
   if (checkpoint)

@@ -2,15 +2,12 @@
 // method.h say.
 #pragma once
 
-#include "core/fields.h"
-#include "core/integrate/error_allowance.h"
 #include "core/integrate/faster_method.h"
 #include "core/integrate/limit_watch.h"
-#include "core/integrate/ode.h"
+#include "core/integrate/step_control.h"
 
 #include <functional>
 #include <utility>
-#include <vector>
 
 namespace ffrobot {
 
@@ -106,16 +103,22 @@ struct Breaks {
   StateFunctionOfTime at;
 };
 
+// What goes along with an integration; any may be null. `limits` looks at all steps.
+struct Companions {
+  Recording *recording = nullptr;
+  const Breaks *breaks = nullptr;
+  IntegrationCheckpoint *checkpoint = nullptr;
+  LimitWatch *limits = nullptr;
+  Samples *samples = nullptr;
+};
+
 // Integrates y = (q, v) from times.front() to times.back() and calls output(i, t, y) at every entry of times, in order.
 // carry_on(t) is asked every thousand steps, and about five times a second. y ends at the last accepted step.
-// `recording`, `breaks`, `checkpoint`, `limits`, which looks at all steps, and `samples` may be null. Of a `checkpoint`
-// that has begun in an earlier call with the same `times` the integration goes on: neither outputs nor the `recording`,
-// which has to be the same, begin again, and max_steps counts anew; `limits` has to go on as well. It ends as that of
-// this call.
+// Of a checkpoint that has begun in an earlier call with the same `times` the integration goes on: neither outputs nor
+// the recording, which has to be the same, begin again, and max_steps counts anew; `limits` has to go on as well. It
+// ends as that of this call.
 IntegrationReport integrate(OdeSystem &system, const std::vector<double> &times, VectorXd &y,
                             const IntegrationControls &controls, const StateFunctionOfTime &output,
-                            const std::function<bool(double)> &carry_on, Recording *recording,
-                            const Breaks *breaks = nullptr, IntegrationCheckpoint *checkpoint = nullptr,
-                            LimitWatch *limits = nullptr, Samples *samples = nullptr);
+                            const std::function<bool(double)> &carry_on, const Companions &with = {});
 
 } // namespace ffrobot

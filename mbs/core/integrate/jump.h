@@ -3,7 +3,6 @@
 
 #include "core/integrate/ode.h"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>

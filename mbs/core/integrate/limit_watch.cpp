@@ -1,6 +1,5 @@
 #include "core/integrate/limit_watch.h"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>

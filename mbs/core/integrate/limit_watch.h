@@ -3,12 +3,9 @@
 // method needs more slopes for its dense output, they are those of another system.
 #pragma once
 
-#include "core/fields.h"
 #include "core/integrate/method.h"
 
-#include <memory>
 #include <optional>
-#include <vector>
 
 namespace ffrobot {
 

@@ -4,8 +4,6 @@
 #include "core/fields.h"
 #include "core/integrate/ode.h"
 
-#include "core/eigen.h"
-
 #include <memory>
 
 namespace ffrobot {

@@ -3,8 +3,6 @@
 
 #include "core/space/local_coordinates.h"
 
-#include "core/eigen.h"
-
 #include <complex>
 
 namespace ffrobot {

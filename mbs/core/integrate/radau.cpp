@@ -1,6 +1,5 @@
 #include "core/integrate/radau.h"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 

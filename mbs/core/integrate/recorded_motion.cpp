@@ -1,7 +1,5 @@
 #include "core/integrate/recorded_motion.h"
 
-#include <algorithm>
-
 namespace ffrobot {
 
 RecordedMotion::RecordedMotion(OdeSystem &motion, const Recording &recording)

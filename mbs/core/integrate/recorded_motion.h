@@ -2,9 +2,6 @@
 #pragma once
 
 #include "core/integrate/integrate.h"
-#include "core/integrate/method.h"
-
-#include <memory>
 
 namespace ffrobot {
 
@@ -30,7 +27,7 @@ public:
 
 private:
   struct Step { // between two recorded states
-    std::size_t index = static_cast<std::size_t>(-1);
+    std::size_t index = -1;
     MethodKind kind = MethodKind::dop853;
     std::unique_ptr<Method> method;
     double begin = 0, length = 0;
@@ -56,7 +53,7 @@ private:
   Step followed_; // stage by stage
   int next_stage_ = 0, stages_ = 0;
   bool is_at_stage_ = false;
-  std::size_t end_ = static_cast<std::size_t>(-1); // of a step, of which the slope is known
+  std::size_t end_ = -1; // of a step, of which the slope is known
   VectorXd z_, slope_, end_slope_;
 };
 

@@ -3,9 +3,6 @@
 
 #include "core/integrate/integrate.h"
 
-#include <functional>
-#include <vector>
-
 namespace ffrobot {
 
 struct Sampling {

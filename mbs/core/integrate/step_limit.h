@@ -4,10 +4,8 @@
 
 #include "core/integrate/ode.h"
 
-#include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <vector>
 
 namespace ffrobot {
 

@@ -4,9 +4,7 @@
 #include "core/integrate/integrate.h"
 #include "core/integrate/step_control.h"
 
-#include <algorithm>
 #include <chrono>
-#include <cmath>
 
 namespace ffrobot {
 

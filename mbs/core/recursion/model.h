@@ -9,7 +9,6 @@
 
 #include <array>
 #include <string>
-#include <vector>
 
 namespace ffrobot::recursion {
 

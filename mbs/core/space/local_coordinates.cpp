@@ -2,7 +2,6 @@
 
 #include "core/space/rotation.h"
 
-#include <algorithm>
 #include <numbers>
 
 namespace ffrobot {

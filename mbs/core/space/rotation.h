@@ -1,6 +1,8 @@
 // Rotations as unit quaternions and as rotation vectors in body axes (rad).
 #pragma once
 
+#include "core/eigen.h"
+
 #include <Eigen/Geometry>
 
 #include <cmath>

@@ -1,8 +1,8 @@
 // One evaluation of the recursion in space, of chains of revolute joints: 3 or 6 links with 10 modes and rows at the
 // tip, or 6 rigid ones. `CHAIN ROWS REPETITIONS` prints the microseconds of the fastest of 20 rounds,
 // with `d` behind them those of an evaluation in duals, with derivatives in eight directions.
-#include "core/recursion/numbers/dual.h"
 #include "core/recursion/mechanism/workspace.h"
+#include "core/recursion/numbers/dual.h"
 
 #include <Eigen/Geometry>
 
@@ -123,7 +123,7 @@ double microseconds(const Mechanism<Spatial> &mechanism, const VectorXd &q, cons
   for (int round = 0; round < 20; ++round) {
     const auto start = std::chrono::steady_clock::now();
     for (int i = 0; i < repetitions; ++i)
-      accelerations(mechanism, at.data(), rate.data(), Forces<T>(), target.data(), w, a.data());
+      accelerations(at.data(), rate.data(), Forces<T>(), target.data(), w, a.data());
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     fastest = std::min(fastest, 1e6 * seconds / repetitions);
   }

@@ -53,7 +53,7 @@ int main(int, char **given) {
       state[1 + i] = 1e-4 / (1 + i), state[second + 1 + i] = 1e-4 / (11 + i);
     v[0] = -0.3, v[second] = 0.6;
     for (int i = 0; i < count; ++i)
-      accelerations(mechanism, state.data(), v.data(), Forces<double>(), target, motion.workspace(), a.data());
+      accelerations(state.data(), v.data(), Forces<double>(), target, motion.workspace(), a.data());
   } else {
     motion.project(0, state.data(), state.data() + mechanism.n_q);
     std::vector<double> times;
@@ -62,8 +62,7 @@ int main(int, char **given) {
     IntegrationControls controls;
     controls.tolerance = 1e-4;
     const IntegrationReport report = integrate(
-        motion, times, state, controls, [](std::size_t, double, const double *) {}, [](double) { return true; },
-        nullptr);
+        motion, times, state, controls, [](std::size_t, double, const double *) {}, [](double) { return true; });
     std::printf("%lu steps, %lu rejected, %lu evaluations; force %.12g %.12g N\n", report.steps, report.rejected,
                 report.evaluations, motion.workspace().lambda[0], motion.workspace().lambda[1]);
     count = static_cast<double>(report.steps);

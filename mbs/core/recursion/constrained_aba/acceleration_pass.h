@@ -40,9 +40,9 @@ inline void accelerate_joint(const Node<Space> &node, const T *q, Hinge<Space, T
   T x[6];
   acceleration_by_freedoms<1>(node, hinge, A);
   if (node.is_single_grounded) {
-    const auto by_section = symmetric_product<d, T>(hinge.Lambda, A);
+    const auto by_section = symmetric_product(hinge.Lambda, A);
     for (int i = 0; i < d; ++i)
-      hinge.f[i] = -(by_section[i] + superposed<Space, T, W>(w, node.ground_slot() + i, y));
+      hinge.f[i] = -(by_section[i] + superposed(w, node.ground_slot() + i, y));
   }
   for (int k = 0; k < node.shape.freedoms.count; ++k) {
     const int f = node.shape.freedoms.component[k];
@@ -57,7 +57,7 @@ inline void accelerate_joint(const Node<Space> &node, const T *q, Hinge<Space, T
     T sum = hinge.U[k][0] * A[0];
     for (int j = 1; j < d; ++j)
       sum += hinge.U[k][j] * A[j];
-    const T found = -(superposed<Space, T, W>(w, node.joint_slot(k), y) + hinge.D_inverse[k] * sum);
+    const T found = -(superposed(w, node.joint_slot(k), y) + hinge.D_inverse[k] * sum);
     x[k] = node.rotor_inertia == 0 ? found - before : found;
     A[f] = node.rotor_inertia == 0 ? found : before + found;
   }
@@ -88,21 +88,21 @@ inline void accelerate_ports(const Node<Space> &node, bool by_multipliers, Works
   for (int k = node.outboard - 1; k >= 0; --k) {
     PortWork<Space, T> &port = w.ports[node.first_port + k];
     T X_A[d];
-    multiply<d, T>(port.X, A, X_A);
+    multiply(port.X, A, X_A);
     if (node.body.ports[k].is_flexible)
       for (int l = k + 1; l < n; ++l)
         if (node.body.ports[l].is_flexible) {
           const auto *K = w.cross.data() + (node.first_cross + cross_index(k, l, n)) * d;
           const T *f = w.ports[node.first_port + l].f;
           T Kf[d];
-          multiply<d, T>(K, f, Kf);
+          multiply(K, f, Kf);
           for (int i = 0; i < d; ++i)
             X_A[i] += Kf[i];
         }
     auto moved = Pack<T, d>::zero(), held = moved;
     const bool is_flexible = node.body.ports[k].is_flexible, loaded = w.m.children[node.first_port + k] >= 0;
     if (loaded)
-      held = symmetric_product<d, T>(port.Y, X_A);
+      held = symmetric_product(port.Y, X_A);
     if (is_flexible || loaded) {
       T answers[d];
       superposed<d>(w, node.port_slot(k), y, answers);
@@ -110,7 +110,7 @@ inline void accelerate_ports(const Node<Space> &node, bool by_multipliers, Works
         port.f[i] = -(answers[i] + held[i]);
     }
     if (is_flexible)
-      moved = symmetric_product<d, T>(port.G, port.f);
+      moved = symmetric_product(port.G, port.f);
     for (int i = 0; i < d; ++i) {
       port.A[i] = X_A[i] + moved[i];
       if (n > 1)
@@ -142,7 +142,7 @@ inline void accelerate_body(const Node<Space> &node, const T *q, bool by_multipl
   if (!by_multipliers)
     for (int i = 0; i < d; ++i)
       A[i] += hinge.c[i];
-  accelerate_joint<Space, T, W>(node, q + node.q, hinge, w, y, A, a + node.v);
+  accelerate_joint(node, q + node.q, hinge, w, y, A, a + node.v);
   T frame[packed<T, d>] = {}, *A_frame = A;
   T *z = w.z.data();
   if (node.body.n)
@@ -153,19 +153,19 @@ inline void accelerate_body(const Node<Space> &node, const T *q, bool by_multipl
     const auto *R = w.soft.data() + w.first_soft[i_node];
     T A_section[packed<T, d>] = {};
     inboard_tilt(node, state).apply(A, A_section);
-    multiply<d, T>(R + d, A_section, port.f);
+    multiply(R + d, A_section, port.f);
     for (int i = 0; i < d; ++i)
-      port.f[i] += superposed<Space, T, W>(w, node.inboard_slot() + d + i, y);
-    multiply<d, T>(R, port.f, frame);
+      port.f[i] += superposed(w, node.inboard_slot() + d + i, y);
+    multiply(R, port.f, frame);
     for (int i = 0; i < d; ++i)
-      frame[i] -= superposed<Space, T, W>(w, node.inboard_slot() + i, y);
+      frame[i] -= superposed(w, node.inboard_slot() + i, y);
     A_frame = frame;
     if (node.body.n)
       put_force(node.body, state, node.inboard, port.f, z);
   }
   for (int i = 0; i < d; ++i)
     state.A[i] = A_frame[i];
-  accelerate_ports<Space, T, W>(node, by_multipliers, w, y, A_frame);
+  accelerate_ports(node, by_multipliers, w, y, A_frame);
   if (node.body.n == 0)
     return;
   for (int i = 0; i < d; ++i)

@@ -21,7 +21,6 @@
 // C M^-1 C^T: u u^T / D at a joint, pi^T G E pi at a port.
 #pragma once
 
-#include "core/recursion/constrained_aba/joint_elimination.h"
 #include "core/recursion/constrained_aba/ports.h"
 
 namespace ffrobot::recursion {
@@ -78,12 +77,11 @@ inline void eliminate_body(const Node<Space> &node, const T *q, const T *v, cons
   for (int i = 0; i < d; ++i)
     H[i] = Cols::zero(), H[i].set(0, b[i]);
   if (node.ports())
-    eliminate_ports<Space, T, W>(node, w, M, H, S, gamma);
+    eliminate_ports(node, w, M, H, S, gamma);
   if (node.inboard >= 0)
-    move_to_section<Space, T, W>(node, w, M, H, S);
-  eliminate_joint<Space, T, W>(node, q + node.q, forces.generalized ? forces.generalized + node.v : nullptr, w, M, H,
-                               S);
-  propagate_to_parent<Space, T, W>(node, w, M, H, gamma);
+    move_to_section(node, w, M, H, S);
+  eliminate_joint(node, q + node.q, forces.generalized ? forces.generalized + node.v : nullptr, w, M, H, S);
+  propagate_to_parent(node, w, M, H, gamma);
 }
 
 } // namespace ffrobot::recursion

@@ -6,7 +6,6 @@
 #pragma once
 
 #include "core/recursion/constrained_aba/passes.h"
-#include "core/recursion/numbers/multipliers.h"
 
 namespace ffrobot::recursion {
 
@@ -65,7 +64,7 @@ void accelerate_in_blocks(const T *q, Workspace<Space, T> &w, T *a) {
 template <class Space, class T>
 void evaluate_in_blocks(const T *q, const T *v, const Forces<T> &forces, bool is_placed, const T *target,
                         Workspace<Space, T> &w, T *a) {
-  const int n = static_cast<int>(w.active.size());
+  const int n = w.active.size();
   T *S_all = w.factor.data(), *lambda = w.y.data() + 1;
   Delassus<T, most_columns> S;
   Pack<T, most_columns> gamma;
@@ -77,7 +76,7 @@ void evaluate_in_blocks(const T *q, const T *v, const Forces<T> &forces, bool is
     if (!is_placed || first > 0) // the backward pass leaves kinematics of some bodies changed
       kinematic_pass(q, v, forces, w);
     backward_pass_of_block(q, v, forces, w, S, gamma);
-    const int count = static_cast<int>(w.active.size());
+    const int count = w.active.size();
     for (int r = 0; r < count; ++r) {
       lambda[first + r] = gamma[r + 1] - S[r + 1][0] - (target[w.active[r]] - w.lift[r]);
       for (int c = 0; c <= r; ++c)

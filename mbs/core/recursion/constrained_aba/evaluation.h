@@ -4,9 +4,7 @@
 
 #include "core/recursion/constrained_aba/blocks.h"
 #include "core/recursion/constrained_aba/loop_joint_forces.h"
-#include "core/recursion/numbers/multipliers.h"
 
-#include <algorithm>
 #include <numeric>
 
 namespace ffrobot::recursion {
@@ -22,12 +20,12 @@ FFROBOT_NOINLINE void evaluate(const T *q, const T *v, const Forces<T> &forces, 
   if constexpr (W == most_columns)
     backward_pass_of_block(q, v, forces, w, S, gamma);
   else
-    backward_pass<Space, T, W>(q, v, forces, w, S, gamma);
+    backward_pass(q, v, forces, w, S, gamma);
   Cols y = Cols::zero();
   y.set(0, T(1.));
   if constexpr (W > 1) {
     T lambda[W - 1];
-    const int rows = static_cast<int>(w.active.size());
+    const int rows = w.active.size();
 #pragma GCC unroll 8
     for (int r = 1; r < W; ++r)
       if (r <= rows)
@@ -49,7 +47,7 @@ FFROBOT_NOINLINE void evaluate(const T *q, const T *v, const Forces<T> &forces, 
   if constexpr (W == most_columns)
     acceleration_pass_of_block<false>(q, y, w, a);
   else
-    acceleration_pass<false, Space, T, W>(q, y, w, a);
+    acceleration_pass<false>(q, y, w, a);
   ++w.evaluations;
 }
 
@@ -104,7 +102,7 @@ template <class Space, class T> void respond(const T *q, Workspace<Space, T> &w,
     if constexpr (W == most_columns)
       acceleration_pass_of_block<true>(q, y, w, dq);
     else
-      acceleration_pass<true, Space, T, W>(q, y, w, dq);
+      acceleration_pass<true>(q, y, w, dq);
   });
 }
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include "core/recursion/constrained_aba/delassus.h"
-#include "core/recursion/kinematics/planar.h"
 #include "core/recursion/kinematics/spatial.h"
 
 namespace ffrobot::recursion {
@@ -146,9 +145,9 @@ inline void eliminate_joint(const Node<Space> &node, const T *q, const T *force,
   change([&](auto *x) { forces_by_freedoms<1>(node, hinge, x); });
   for (int k = node.shape.freedoms.count - 1; k >= 0; --k)
     if (std::is_same_v<T, double> && node.shape.freedoms.component[k] == Space::axis)
-      eliminate_freedom<Space::axis, Space, T, W>(node, k, force ? applied : nullptr, hinge, w, M, H, S);
+      eliminate_freedom<Space::axis>(node, k, force ? applied : nullptr, hinge, w, M, H, S);
     else
-      eliminate_freedom<-1, Space, T, W>(node, k, force ? applied : nullptr, hinge, w, M, H, S);
+      eliminate_freedom<-1>(node, k, force ? applied : nullptr, hinge, w, M, H, S);
   if (M != hinge.Lambda)
     for (int i = 0; i < d; ++i)
       hinge.Lambda[i] = M[i]; // in axes of the cross, or without the last row: `factors` knows

@@ -2,11 +2,8 @@
 // as a moment or force on the second one and its opposite on the first.
 #pragma once
 
-#include "core/fields.h"
 #include "core/recursion/joint/friction.h"
 #include "core/recursion/mechanism/workspace.h"
-
-#include <vector>
 
 namespace ffrobot::recursion {
 

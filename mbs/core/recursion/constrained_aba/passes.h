@@ -1,7 +1,6 @@
 // The three passes over all bodies: kinematics outward, elimination inward, accelerations outward.
 #pragma once
 
-#include "core/recursion/constrained_aba/acceleration_pass.h"
 #include "core/recursion/constrained_aba/constraints.h"
 #include "core/recursion/constrained_aba/pin_joints.h"
 
@@ -21,14 +20,14 @@ FFROBOT_INLINE void backward_pass(const T *q, const T *v, const Forces<T> &force
   gamma = Pack<T, W>::zero();
   for (int r = 0; r < W; ++r)
     S[r] = Pack<T, W>::zero();
-  act_on_ports<Space, T, W>(forces, w, S);
+  act_on_ports(forces, w, S);
   for (std::size_t i = w.hinges.size(); i-- > 0;) {
     if constexpr (Space::dim == 3)
       if (w.m.nodes[i].is_pin) {
-        eliminate_pin<T, W>(i, q, v, forces, w, S, gamma);
+        eliminate_pin(i, q, v, forces, w, S, gamma);
         continue;
       }
-    eliminate_body<Space, T, W>(w.m.nodes[i], q, v, forces, w, S, gamma);
+    eliminate_body(w.m.nodes[i], q, v, forces, w, S, gamma);
   }
 }
 
@@ -37,10 +36,10 @@ FFROBOT_INLINE void acceleration_pass(const T *q, const Pack<T, W> &y, Workspace
   for (std::size_t i = 0; i < w.hinges.size(); ++i) {
     if constexpr (Space::dim == 3)
       if (w.m.nodes[i].is_pin) {
-        accelerate_pin<by_multipliers, T, W>(i, q, w, y, a);
+        accelerate_pin<by_multipliers>(i, q, w, y, a);
         continue;
       }
-    accelerate_body<Space, T, W>(w.m.nodes[i], q, by_multipliers, w, y, a);
+    accelerate_body(w.m.nodes[i], q, by_multipliers, w, y, a);
   }
 }
 
@@ -48,12 +47,12 @@ FFROBOT_INLINE void acceleration_pass(const T *q, const Pack<T, W> &y, Workspace
 template <class Space, class T>
 FFROBOT_NOINLINE void backward_pass_of_block(const T *q, const T *v, const Forces<T> &forces, Workspace<Space, T> &w,
                                              Delassus<T, most_columns> &S, Pack<T, most_columns> &gamma) {
-  backward_pass<Space, T, most_columns>(q, v, forces, w, S, gamma);
+  backward_pass(q, v, forces, w, S, gamma);
 }
 template <bool by_multipliers, class Space, class T>
 FFROBOT_NOINLINE void acceleration_pass_of_block(const T *q, const Pack<T, most_columns> &y, Workspace<Space, T> &w,
                                                  T *a) {
-  acceleration_pass<by_multipliers, Space, T, most_columns>(q, y, w, a);
+  acceleration_pass<by_multipliers>(q, y, w, a);
 }
 
 } // namespace ffrobot::recursion

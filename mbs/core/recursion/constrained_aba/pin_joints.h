@@ -194,7 +194,7 @@ FFROBOT_INLINE void eliminate_pin(std::size_t i_node, const T *q, const T *v, co
   PinInertia<T> L;
   Cols H[3];
   if (node.outboard)
-    L = eliminate_port_of_pin<T, W>(node, along, w, H, S, gamma);
+    L = eliminate_port_of_pin(node, along, w, H, S, gamma);
   else
     H[0] = H[1] = H[2] = Cols::zero();
   const planar::Inertia<T> I = inertia(body, s);
@@ -221,7 +221,7 @@ FFROBOT_INLINE void eliminate_pin(std::size_t i_node, const T *q, const T *v, co
   T *U_by_D = w.hinges[i_node].pin;
   U_by_D[0] = ux, U_by_D[1] = uy;
   H[0] -= M_xa * sd, H[1] -= M_ya * sd;
-  propagate_pin_to_parent<T, W>(node, M_xx - M_xa * ux, M_xy - M_xa * uy, M_yy - M_ya * uy, H, along.applied, w, gamma);
+  propagate_pin_to_parent(node, M_xx - M_xa * ux, M_xy - M_xa * uy, M_yy - M_ya * uy, H, along.applied, w, gamma);
 }
 
 // Force on the port, into z as well, and its acceleration; on_modes: along the joint's coordinate, of multipliers
@@ -236,8 +236,7 @@ FFROBOT_INLINE void accelerate_port_of_pin(const Node<Planar> &node, const T &Ax
   PortWork<Planar, T> &port = w.ports[node.first_port];
   const T Xx = s.X_of_block(0, 0) * Ax + s.X_of_block(0, 1) * Ay + port.X_xa * Aa;
   const T Xy = s.X_of_block(1, 0) * Ax + s.X_of_block(1, 1) * Ay + port.X_ya * Aa;
-  T fx = -superposed<Planar, T, W>(w, node.port_slot(0), y),
-    fy = -superposed<Planar, T, W>(w, node.port_slot(0) + 1, y);
+  T fx = -superposed(w, node.port_slot(0), y), fy = -superposed(w, node.port_slot(0) + 1, y);
   if (node.is_loaded) // Y beta is among the columns
     fx -= port.Y_xx * Xx + port.Y_xy * Xy, fy -= port.Y_xy * Xx + port.Y_yy * Xy;
   z[3] = fx, z[4] = fy;
@@ -281,10 +280,10 @@ FFROBOT_INLINE void accelerate_pin(std::size_t i_node, const T *q, Workspace<Pla
   const T Ax = c * Px + n * Py, Ay = c * Py - n * Px;
   if (node.is_single_grounded) {
     const T xx = hinge.Lambda[0][0], xy = hinge.Lambda[0][1], yy = hinge.Lambda[1][1];
-    hinge.f[0] = -(superposed<Planar, T, W>(w, node.ground_slot(), y) + xx * Ax + xy * Ay);
-    hinge.f[1] = -(superposed<Planar, T, W>(w, node.ground_slot() + 1, y) + xy * Ax + yy * Ay);
+    hinge.f[0] = -(superposed(w, node.ground_slot(), y) + xx * Ax + xy * Ay);
+    hinge.f[1] = -(superposed(w, node.ground_slot() + 1, y) + xy * Ax + yy * Ay);
   }
-  T Aa = -(superposed<Planar, T, W>(w, node.joint_slot(0), y) + hinge.pin[0] * Ax + hinge.pin[1] * Ay);
+  T Aa = -(superposed(w, node.joint_slot(0), y) + hinge.pin[0] * Ax + hinge.pin[1] * Ay);
   const T *target = W > 1 ? prescribed(node, hinge, w, 0) : nullptr;
   if (target && !body.is_tilted)
     Aa = P_rotation + *target;
@@ -296,7 +295,7 @@ FFROBOT_INLINE void accelerate_pin(std::size_t i_node, const T *q, Workspace<Pla
   const T on_port = by_multipliers ? T(0.) : s.on_port;
   T z[8] = {-Ax, -Ay, -Aa, T(0.), T(0.), on_port, by_multipliers ? on_modes : s.on_modes + on_modes, T(0.)};
   if (node.outboard)
-    accelerate_port_of_pin<by_multipliers, T, W>(node, Ax, Ay, Aa, on_modes, on_port, constraints_on_modes, w, y, z);
+    accelerate_port_of_pin<by_multipliers>(node, Ax, Ay, Aa, on_modes, on_port, constraints_on_modes, w, y, z);
   if (body.is_tilted) {
     a[node.v] += s.gram_of_block(tilt, 3) * z[3] + s.gram_of_block(tilt, 4) * z[4] - s.gram_of_block(tilt, 0) * Ax -
                  s.gram_of_block(tilt, 1) * Ay - s.gram_of_block(tilt, 2) * Aa;

@@ -1,12 +1,8 @@
 #include "core/recursion/constrained_aba/point_force.h"
 
 #include "core/recursion/numbers/dual.h"
-#include "core/recursion/numbers/small.h"
 
 #include <Eigen/Geometry>
-
-#include <array>
-#include <cmath>
 
 namespace ffrobot::recursion {
 

@@ -3,8 +3,6 @@
 
 #include "core/recursion/mechanism/workspace.h"
 
-#include <functional>
-
 namespace ffrobot {
 
 // Writes force and moment (N, N m) at time t (s) for the motion of a section, all in global axes.

@@ -2,8 +2,6 @@
 #pragma once
 
 #include "core/recursion/constrained_aba/subtree_inertia.h"
-#include "core/recursion/kinematics/planar.h"
-#include "core/recursion/kinematics/spatial.h"
 
 namespace ffrobot::recursion {
 
@@ -120,7 +118,7 @@ FFROBOT_INLINE void answer_of_port(PortWork<Space, T> &port, bool is_flexible, b
       gamma += port.beta[i] * F[i];
   if (!is_flexible && !bias) {
     if (loaded) {
-      const auto Y_beta = symmetric_product<d, T>(port.Y, port.beta);
+      const auto Y_beta = symmetric_product(port.Y, port.beta);
       for (int i = 0; i < d; ++i)
         F[i].add(0, Y_beta[i]);
     }
@@ -159,26 +157,25 @@ inline void eliminate_ports(const Node<Space> &node, Workspace<Space, T> &w, Pac
     const int child = w.m.children[index];
     const bool loaded = child >= 0;
     if (loaded)
-      subtree_inertia<Space, T>(w.m.nodes[child], w.hinges[child], is_flexible, port.G, port.Y);
+      subtree_inertia(w.m.nodes[child], w.hinges[child], is_flexible, port.G, port.Y);
     Cols F[d];
     const T *P = w.force.data() + index * d * stride;
     for (int i = 0; i < d; ++i)
       F[i] = Cols::read(P + i * stride);
-    answer_of_port<Space, T, W>(port, is_flexible, loaded, several ? w.bias.data() + index * d * stride : nullptr, F, S,
-                                gamma);
+    answer_of_port(port, is_flexible, loaded, several ? w.bias.data() + index * d * stride : nullptr, F, S, gamma);
     T *answer = w.stored.data() + node.port_slot(k) * stride;
     for (int i = 0; i < d; ++i)
       F[i].write(answer + i * stride);
     if (loaded) {
       Pack<T, d> YX[d];
-      apply<d, T>(port.Y, port.X, YX);
-      gain_by_transpose<d, T, W>(port.X, F, YX, H, M);
+      apply(port.Y, port.X, YX);
+      gain_by_transpose(port.X, F, YX, H, M);
     } else
       for (int i = 0; i < d; ++i)
         for (int r = 0; r < d; ++r)
           H[r] += port.X[i][r] * F[i];
     if (several)
-      spread_to_later_ports<Space, T, W>(node, k, loaded, F, w);
+      spread_to_later_ports(node, k, loaded, F, w);
   }
 }
 
@@ -193,7 +190,7 @@ inline void move_to_section(const Node<Space> &node, Workspace<Space, T> &w, Pac
   const int index = node.first_port + node.inboard;
   PortWork<Space, T> &port = w.ports[index];
   MatrixRow *R = w.soft.data() + w.first_soft[node.index]; // M^-1 X^T
-  invert<d, T>(M);
+  invert(M);
   for (int i = 0; i < d; ++i) {
     T row[d];
     for (int r = 0; r < d; ++r)
@@ -207,9 +204,9 @@ inline void move_to_section(const Node<Space> &node, Workspace<Space, T> &w, Pac
     for (int i = 0; i < d; ++i)
       N[r] += port.X[r][i] * R[i];
   }
-  invert<d, T>(N);
+  invert(N);
   Cols MH[d], B[d], Pi[d];
-  apply<d, T>(M, H, MH);
+  apply(M, H, MH);
   for (int r = 0; r < d; ++r) {
     if (node.ports() > 1)
       B[r] = Cols::read(w.bias.data() + (index * d + r) * stride);
@@ -218,7 +215,7 @@ inline void move_to_section(const Node<Space> &node, Workspace<Space, T> &w, Pac
     for (int i = 0; i < d; ++i)
       B[r] -= port.X[r][i] * MH[i];
   }
-  apply<d, T>(N, B, Pi);
+  apply(N, B, Pi);
   const auto tilt = inboard_tilt(node, w.bodies[node.index]);
   for (int i = 0; i < d; ++i) {
     Pi[i] = T(-1.) * Pi[i];

@@ -1,13 +1,10 @@
 #include "core/recursion/inverse/force_slopes.h"
 
-#include "core/linear/products.h"
+#include "core/linear/dense.h"
 #include "core/recursion/motion/natural_sizes.h"
 #include "core/recursion/motion/postures.h"
 #include "core/recursion/motion/scene_forces.h"
 #include "core/recursion/numbers/dual.h"
-#include "core/space/configuration_space.h"
-
-#include <algorithm>
 
 namespace ffrobot::recursion {
 

@@ -3,8 +3,6 @@
 #include "core/recursion/constrained_aba/once.h"
 #include "core/recursion/inverse/observe.h"
 
-#include <algorithm>
-
 namespace ffrobot::recursion {
 
 namespace {

@@ -3,11 +3,6 @@
 
 #include "core/recursion/newton_euler/newton_euler.h"
 
-#include "core/eigen.h"
-
-#include <array>
-#include <vector>
-
 namespace ffrobot::recursion {
 
 // A row for each state, global axes. Forces come with their moments about the origin of the section on which they act:

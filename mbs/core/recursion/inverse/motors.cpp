@@ -1,9 +1,7 @@
 #include "core/recursion/inverse/motors.h"
 
 #include "core/check_index.h"
-#include "core/linear/products.h"
-
-#include <stdexcept>
+#include "core/linear/dense.h"
 
 namespace ffrobot::recursion {
 
@@ -20,9 +18,7 @@ DrivenMechanism<Space>::DrivenMechanism(const Mechanism<Space> &m, const Scene &
 }
 
 template <class Space> void DrivenMechanism<Space>::check() const {
-  if (is_path.size() != mechanism.constraints.size())
-    throw std::invalid_argument("is_path: expected " + std::to_string(mechanism.constraints.size()) + " values, got " +
-                                std::to_string(is_path.size()));
+  check_size("is_path", is_path.size(), mechanism.constraints.size());
   for (const Motor &motor : motors)
     check_index("coordinate of a motor", motor.coordinate, mechanism.n_v);
 }

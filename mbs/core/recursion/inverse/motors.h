@@ -1,7 +1,7 @@
 // What motors and modal forces must do in place of the forces that hold trajectories.
 #pragma once
 
-#include "core/linear/least_norm.h"
+#include "core/linear/dense.h"
 #include "core/recursion/motion/motion.h"
 #include "core/recursion/newton_euler/newton_euler.h"
 

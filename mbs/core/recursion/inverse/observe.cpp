@@ -1,6 +1,5 @@
 #include "core/recursion/inverse/observe.h"
 
-#include "core/recursion/constrained_aba/joint_elimination.h"
 #include "core/recursion/constrained_aba/once.h"
 
 #include <Eigen/Geometry>
@@ -100,7 +99,7 @@ std::vector<FrameMotion> frame_motions(const double *q, const double *v, Workspa
     const Vector3d acceleration = R * a + g, turning = R * alpha, omega = vector(frame.omega);
     const Vector3d d = R * w.m.nodes[i].origin;
     const Vector3d at_origin = acceleration + turning.cross(d) + omega.cross(omega.cross(d));
-    all.push_back({vector(frame.r), vector(frame.v), acceleration, omega, turning, R, frame.angle, at_origin});
+    all.push_back({vector(frame.r), acceleration, omega, turning, R, at_origin});
   }
   return all;
 }

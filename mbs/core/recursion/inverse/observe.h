@@ -6,13 +6,12 @@
 
 namespace ffrobot::recursion {
 
-// Frames of all bodies after accelerations(): rows (3) of position, velocity, acceleration, angular velocity, angular
-// acceleration; R: body axes to global ones. In the plane the third components are angles' and zero. Frames may sit at
-// joints (mechanism.h): a_origin is the acceleration of the origin of the body's data.
+// Frames of all bodies after accelerations(): position, acceleration, angular velocity and acceleration (3), in the
+// plane with third components that are angles' or zero; R: body axes to global ones. Frames may sit at joints
+// (mechanism.h): a_origin is the acceleration of the origin of the body's data.
 struct FrameMotion {
-  Vector3d r, v, a, omega, alpha;
+  Vector3d r, a, omega, alpha;
   Matrix3d R;
-  double angle = 0; // in the plane, full turns counted
   Vector3d a_origin;
 };
 

@@ -1,12 +1,8 @@
 #include "core/recursion/inverse/prescribed_motion.h"
 
-#include "core/linear/products.h"
+#include "core/check_index.h"
+#include "core/linear/dense.h"
 #include "core/recursion/motion/postures.h"
-
-#include <algorithm>
-#include <limits>
-#include <stdexcept>
-#include <string>
 
 namespace ffrobot::recursion {
 
@@ -30,9 +26,7 @@ template <class Space> const VectorXd &checked(const DrivenMechanism<Space> &dri
   if (equations < joints)
     throw std::invalid_argument("rows: expected " + std::to_string(joints) +
                                 ", as many as joints have coordinates, got " + std::to_string(equations));
-  if (q.size() != driven.mechanism.n_q)
-    throw std::invalid_argument("q: expected " + std::to_string(driven.mechanism.n_q) + " coordinates, got " +
-                                std::to_string(q.size()));
+  check_size("q", q.size(), driven.mechanism.n_q);
   return q;
 }
 

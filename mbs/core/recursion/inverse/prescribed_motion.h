@@ -10,9 +10,6 @@
 
 #include "core/recursion/inverse/force_slopes.h"
 #include "core/recursion/inverse/motors.h"
-#include "core/recursion/motion/natural_sizes.h"
-
-#include <optional>
 
 namespace ffrobot::recursion {
 

@@ -1,9 +1,7 @@
 // Where frames and sections are and how they move, in global axes: the end of the first pass.
 #pragma once
 
-#include "core/recursion/kinematics/planar.h"
 #include "core/recursion/kinematics/spatial.h"
-#include "core/recursion/mechanism/workspace.h"
 
 namespace ffrobot::recursion {
 

@@ -4,11 +4,6 @@
 
 #include <Eigen/Geometry>
 
-#include <algorithm>
-#include <cmath>
-#include <stdexcept>
-#include <type_traits>
-
 namespace ffrobot::recursion {
 
 namespace {
@@ -137,8 +132,7 @@ template <class Space>
 Mechanism<Space>::Mechanism(std::vector<BodyModel<Data>> bodies, std::vector<Marker> ground_,
                             std::vector<ConstraintModel> models, std::vector<MarkerAt> loaded, const VectorXd &gravity_)
     : ground(std::move(ground_)), gravity(gravity_) {
-  if (gravity.size() != Space::linear)
-    refuse("gravity: expected " + std::to_string(Space::linear) + " components, got " + std::to_string(gravity.size()));
+  check_size("gravity", gravity.size(), Space::linear);
   const std::size_t count = bodies.size();
   nodes.resize(count);
   Plan plan{std::move(bodies), std::vector<std::vector<int>>(count), std::vector<char>(count),
@@ -188,7 +182,7 @@ template <class Space> Attachment Mechanism<Space>::attach(const MarkerAt &at, P
     refuse("marker: expected a body below " + std::to_string(plan.markers.size()) + ", got " + std::to_string(at.body));
   auto &ports = plan.markers[at.body];
   const auto found = std::find(ports.begin(), ports.end(), at.marker);
-  const int port = static_cast<int>(found - ports.begin());
+  const int port = found - ports.begin();
   if (found == ports.end())
     ports.push_back(at.marker);
   return {at.body, port, -1};

@@ -5,10 +5,6 @@
 
 #include "core/recursion/mechanism/space.h"
 
-#include "core/eigen.h"
-
-#include <cmath>
-
 namespace ffrobot::recursion {
 
 // A body with its inboard joint.

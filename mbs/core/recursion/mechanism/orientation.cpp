@@ -4,8 +4,6 @@
 
 #include <Eigen/Geometry>
 
-#include <algorithm>
-
 namespace ffrobot::recursion {
 
 namespace {

@@ -4,8 +4,6 @@
 #include "core/recursion/mechanism/mechanism.h"
 #include "core/recursion/mechanism/orientation.h"
 
-#include <type_traits>
-
 namespace ffrobot::recursion {
 
 // Columns side by side: 0 is what acts without constraints, column r what a unit of multiplier r does. Sizes that are

@@ -1,7 +1,5 @@
 #include "core/recursion/motion/constraint_laws.h"
 
-#include <algorithm>
-
 namespace ffrobot::recursion {
 
 namespace {

@@ -3,7 +3,6 @@
 #include "core/recursion/motion/natural_sizes.h"
 #include "core/recursion/motion/postures.h"
 
-#include <algorithm>
 #include <numeric>
 
 namespace ffrobot::recursion {

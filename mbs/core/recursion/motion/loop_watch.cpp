@@ -1,9 +1,7 @@
 #include "core/recursion/motion/loop_watch.h"
 
-#include "core/linear/least_norm.h"
+#include "core/linear/dense.h"
 #include "core/recursion/motion/postures.h"
-
-#include <cmath>
 
 namespace ffrobot::recursion {
 

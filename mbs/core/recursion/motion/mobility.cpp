@@ -1,10 +1,8 @@
 #include "core/recursion/motion/mobility.h"
 
-#include "core/linear/least_norm.h"
+#include "core/linear/dense.h"
 #include "core/recursion/motion/natural_sizes.h"
 #include "core/recursion/motion/postures.h"
-
-#include <algorithm>
 
 namespace ffrobot::recursion {
 
@@ -63,7 +61,27 @@ Mobility mobility(const PostureWatch &watch, const double *q, Workspace<Space, d
   return {std::move(loops), rank, std::move(free), std::move(rates), std::move(path)};
 }
 
+template <class Space>
+void look(const PostureWatch &watch, double t, const double *q, Workspace<Space, double> &w, PostureHistory &history) {
+  double ratio = 1, determinant = 0, at = t;
+  if (std::ranges::find(watch.is_path, 1) != watch.is_path.end()) {
+    const Mobility found = mobility(watch, q, w);
+    ratio = found.ratio(), determinant = found.determinant();
+  }
+  if (determinant * history.determinant < 0) { // between this posture and the last
+    ratio = 0;
+    at -= (t - history.watched_at) * determinant / (determinant - history.determinant);
+  }
+  history.determinant = determinant, history.watched_at = t;
+  if (ratio < history.least_ratio) {
+    history.least_ratio = ratio, history.singular_at = at;
+    history.singular_posture = Map<const VectorXd>(q, w.m.n_q);
+  }
+}
+
 template Mobility mobility(const PostureWatch &, const double *, Workspace<Planar, double> &, Index);
 template Mobility mobility(const PostureWatch &, const double *, Workspace<Spatial, double> &, Index);
+template void look(const PostureWatch &, double, const double *, Workspace<Planar, double> &, PostureHistory &);
+template void look(const PostureWatch &, double, const double *, Workspace<Spatial, double> &, PostureHistory &);
 
 } // namespace ffrobot::recursion

@@ -2,10 +2,6 @@
 
 #include "core/recursion/motion/independent_constraints.h"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
 namespace ffrobot::recursion {
 
 namespace {

@@ -3,16 +3,11 @@
 // equations with the columns of the last evaluation.
 #pragma once
 
-#include "core/integrate/ode.h"
 #include "core/recursion/motion/constraint_laws.h"
 #include "core/recursion/motion/loop_watch.h"
 #include "core/recursion/motion/motion_norm.h"
 #include "core/recursion/motion/newton_system.h"
 #include "core/recursion/motion/scene_forces.h"
-
-#include <algorithm>
-#include <optional>
-#include <utility>
 
 namespace ffrobot::recursion {
 

@@ -1,12 +1,9 @@
 #include "core/recursion/motion/motion_norm.h"
 
-#include "core/linear/squares.h"
+#include "core/recursion/numbers/four_doubles.h"
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 #include <map>
-#include <stdexcept>
 
 namespace ffrobot::recursion {
 
@@ -100,7 +97,7 @@ template <class Space> void MotionNorm<Space>::group_forces() {
   }
   leverage_.assign(is_moment_.size(), leverage);
   const auto add_joint = [&](std::vector<std::size_t> &to, std::size_t at) {
-    const int force = static_cast<int>(is_moment_.size());
+    const int force = is_moment_.size();
     to.push_back(at);
     is_moment_.insert(is_moment_.end(), {false, true}), leverage_.insert(leverage_.end(), 2, leverage);
     for (int i = 0; i < Space::dim; ++i)

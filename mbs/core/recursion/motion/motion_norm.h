@@ -1,7 +1,6 @@
 // What the tolerance of a run in joint coordinates bounds: errors relative to the largest so far of what is alike.
 #pragma once
 
-#include "core/fields.h"
 #include "core/recursion/motion/natural_sizes.h"
 
 namespace ffrobot::recursion {

@@ -1,8 +1,5 @@
 #include "core/recursion/motion/natural_sizes.h"
 
-#include <algorithm>
-#include <cmath>
-
 namespace ffrobot::recursion {
 
 namespace {

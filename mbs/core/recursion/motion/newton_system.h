@@ -10,8 +10,6 @@
 
 #include "core/recursion/motion/scene.h"
 
-#include <complex>
-
 namespace ffrobot::recursion {
 
 template <class Space> class NewtonSystem {

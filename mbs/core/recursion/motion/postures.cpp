@@ -1,7 +1,6 @@
 #include "core/recursion/motion/postures.h"
 
-#include "core/linear/least_norm.h"
-#include "core/space/configuration_space.h"
+#include "core/linear/dense.h"
 
 namespace ffrobot::recursion {
 

@@ -4,9 +4,6 @@
 #include "core/recursion/motion/scene.h"
 #include "core/recursion/newton_euler/newton_euler.h"
 
-#include <cmath>
-#include <utility>
-
 namespace ffrobot::recursion {
 
 // C_v (constraints, n_v) at q (n_q): row by row the generalized forces of a unit multiplier, by virtual work. `w` has

@@ -1,20 +1,12 @@
 // What a mechanism follows and what acts on it, as the caller says it.
 #pragma once
 
-#include "core/fields.h"
 #include "core/integrate/limit_watch.h"
 #include "core/recursion/constrained_aba/loop_joint.h"
 #include "core/recursion/constrained_aba/point_force.h"
-#include "core/recursion/joint/friction.h"
-#include "core/recursion/motion/singular_posture.h"
-#include "core/time_function/time_function.h"
+#include "core/recursion/motion/mobility.h"
 
-#include <algorithm>
-#include <cmath>
-#include <cstddef>
-#include <optional>
 #include <utility>
-#include <vector>
 
 namespace ffrobot::recursion {
 

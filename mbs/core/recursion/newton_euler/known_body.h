@@ -5,8 +5,6 @@
 #include "core/recursion/newton_euler/planar_body.h"
 #include "core/recursion/newton_euler/spatial_body.h"
 
-#include "core/eigen.h"
-
 namespace ffrobot::recursion {
 
 // Of rows of W: W p_ddot, with geometric stiffening less p_dot^T K p_dot

@@ -1,10 +1,6 @@
 #include "core/recursion/newton_euler/newton_euler.h"
 
-#include "core/recursion/constrained_aba/joint_elimination.h"
 #include "core/recursion/constrained_aba/once.h"
-
-#include <algorithm>
-#include <cmath>
 
 namespace ffrobot::recursion {
 
@@ -143,7 +139,7 @@ void NewtonEuler<Space>::load(const double *lambda, const double *wrench, const 
     for (const Action &action : actions.list) {
       const double size = action.constraint < 0 ? wrench != nullptr : lambda ? -lambda[action.constraint] : 0;
       if (size != 0)
-        add(in_port_axes_of<Space>(actions, action, wrench, w), on_ports_[actions.global_port], size);
+        add(in_port_axes_of(actions, action, wrench, w), on_ports_[actions.global_port], size);
     }
   on_coordinates_.setZero();
   for (std::size_t r = 0; lambda && r < mechanism_.constraints.size(); ++r)
@@ -368,7 +364,7 @@ NewtonEuler<Space>::of_constraint(std::size_t r, const double *a, const Workspac
     for (const Action &action : actions.list)
       if (action.constraint == static_cast<int>(r)) {
         const std::size_t port = actions.global_port;
-        const Vector x = in_port_axes_of<Space>(actions, action, nullptr, w);
+        const Vector x = in_port_axes_of(actions, action, nullptr, w);
         found.value += product(x, ports_[port]);
         for (std::size_t k = 0; k < x.size(); ++k)
           found.size += std::abs(x[k]) * (std::abs(ports_[port][k]) + terms_[port]);

@@ -3,12 +3,7 @@
 // that finds accelerations but the kinematics of a state, in space the inertia of each body as well.
 #pragma once
 
-#include "core/recursion/mechanism/workspace.h"
 #include "core/recursion/newton_euler/known_body.h"
-
-#include "core/eigen.h"
-
-#include <array>
 
 namespace ffrobot::recursion {
 

@@ -3,10 +3,6 @@
 
 #include "core/recursion/kinematics/planar.h"
 
-#include "core/eigen.h"
-
-#include <array>
-
 namespace ffrobot::recursion::planar {
 
 using Vector = std::array<double, 3>; // (x, y, about z): an acceleration less gravity, or a force with its moment

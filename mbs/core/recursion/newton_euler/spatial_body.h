@@ -8,10 +8,6 @@
 
 #include "core/recursion/kinematics/spatial.h"
 
-#include "core/eigen.h"
-
-#include <array>
-
 namespace ffrobot::recursion::spatial {
 
 using Vector =

@@ -57,7 +57,7 @@ template <class T, int W> FFROBOT_INLINE void solve_multipliers(const Pack<T, W>
     return;
   }
   if constexpr (m == 2)
-    return solve_two<T, W>(S, x, factor);
+    return solve_two(S, x, factor);
   T M[m][m], D[m];
 #pragma GCC unroll 8
   for (int r = 0; r < m; ++r)

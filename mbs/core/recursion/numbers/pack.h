@@ -70,7 +70,7 @@ template <class T, int n> struct Pack {
 template <int n>
   requires(n > 1)
 struct Pack<double, n> {
-  static constexpr int lanes = static_cast<int>(std::bit_ceil(static_cast<unsigned>(n)));
+  static constexpr int lanes = std::bit_ceil(static_cast<unsigned>(n));
   Register<lanes> v;
 
   FFROBOT_INLINE static Pack zero() { return {Register<lanes>::zero()}; }

@@ -2,8 +2,6 @@
 
 #include <Eigen/Geometry>
 
-#include <algorithm>
-
 namespace ffrobot::recursion::planar {
 
 PlanarData moved(const PlanarData &data, const Vector2d &position, double angle) {
@@ -73,7 +71,7 @@ void Body::fill_rows(const PlanarData &data, const std::vector<int> &used, int t
     const PlanarMarker &marker = data.markers[used[k]];
     Port port;
     port.x = marker.position.x(), port.y = marker.position.y(), port.angle = marker.angle;
-    const int i = static_cast<int>(k);
+    const int i = k;
     port.row = i == 0 ? 3 : 8 * ((i + 1) / 2) + 3 * ((i + 1) % 2);
     if (n) {
       W.middleRows<3>(port.row) = marker.Phi;

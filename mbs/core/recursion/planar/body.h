@@ -8,8 +8,6 @@
 // pin (pin_joints.h), that rotation is row TILT of the first block; the row after it is zero (bent_modes.h: FORCE).
 #pragma once
 
-#include "core/recursion/numbers/register.h"
-#include "core/recursion/numbers/small.h"
 #include "core/recursion/planar/stiffening.h"
 #include "core/recursion/spatial/bent_modes.h"
 

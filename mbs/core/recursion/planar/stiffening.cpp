@@ -2,10 +2,6 @@
 
 #include <Eigen/Geometry>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-
 namespace ffrobot::recursion::planar {
 
 namespace {

@@ -16,8 +16,6 @@
 #include "core/recursion/model.h"
 #include "core/recursion/spatial/mode_matrix.h"
 
-#include "core/eigen.h"
-
 namespace ffrobot::recursion::planar {
 
 constexpr int fields = 4;

@@ -1,7 +1,5 @@
 #include "core/recursion/spatial/body.h"
 
-#include <algorithm>
-
 namespace ffrobot::recursion::spatial {
 
 using ExtendedMatrix = Matrix<long double, Dynamic, Dynamic>;

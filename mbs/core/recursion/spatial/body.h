@@ -13,9 +13,6 @@
 // need them); these are in W alone, not in `rows` and G, which the other products are made of.
 #pragma once
 
-#include "core/recursion/model.h"
-#include "core/recursion/numbers/small.h"
-#include "core/recursion/spatial/mode_matrix.h"
 #include "core/recursion/spatial/stiffening.h"
 
 #include <memory>

@@ -148,7 +148,7 @@ template <class T> FFROBOT_INLINE void project_forces(const Body &b, State<T> &s
 // rows, M loses m h_c z_c^T + z_c h_c^T m^T + sum over e of z_c (h_c.h_e) z_e^T: r_c z_c^T and its transpose, if half
 // of the last is with m h_c in r_c.
 template <class T> FFROBOT_INLINE void eliminate_twists(const Body &b, int n, State<T> &s, FrameTerms<T> &to) {
-  const int count = static_cast<int>(b.twists.size());
+  const int count = b.twists.size();
   const T *Q_f = s.Q_f.data();
   for (int c = 0; c < count; ++c) {
     const double *z = b.twists[c].axis;

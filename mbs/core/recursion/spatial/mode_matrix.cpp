@@ -6,7 +6,7 @@ namespace ffrobot::recursion {
 // and five for a row.
 ModeMatrix::ModeMatrix(const MatrixXd &given, double rounding) : n(static_cast<int>(given.rows())) {
   const MatrixXd M = (given.array().abs() > rounding).select(given, 0.0);
-  const int filled = static_cast<int>((M.array() != 0).count());
+  const int filled = (M.array() != 0).count();
   if (filled == 0)
     return;
   if (M.isDiagonal(0)) {

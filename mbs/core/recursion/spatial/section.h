@@ -5,7 +5,6 @@
 #include "core/recursion/spatial/mode_matrix.h"
 
 #include <array>
-#include <cmath>
 
 namespace ffrobot::recursion::spatial {
 

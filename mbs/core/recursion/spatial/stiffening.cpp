@@ -2,9 +2,6 @@
 
 #include "core/recursion/spatial/body.h"
 
-#include <algorithm>
-#include <cmath>
-
 namespace ffrobot::recursion::spatial {
 
 using Eigen::Matrix4d;
@@ -23,7 +20,7 @@ Orthonormal orthonormal(const SpatialData &data) {
   Orthonormal found;
   const double longest = N.diagonal().tail<3>().maxCoeff();
   for (int k = 0; k < 4; ++k) {
-    const int count = static_cast<int>(found.pivot.size());
+    const int count = found.pivot.size();
     const Eigen::Vector4d left = N.col(k) - found.L.leftCols(count) * found.L.row(k).head(count).transpose();
     if (!(left[k] > (k == 0 ? 0 : negligible * longest)))
       continue;

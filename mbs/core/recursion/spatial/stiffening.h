@@ -17,8 +17,6 @@
 #include "core/recursion/model.h"
 #include "core/recursion/spatial/mode_matrix.h"
 
-#include "core/eigen.h"
-
 namespace ffrobot::recursion::spatial {
 
 constexpr int most_fields = 4;

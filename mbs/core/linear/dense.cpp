@@ -1,8 +1,17 @@
-#include "core/linear/least_norm.h"
+#include "core/linear/dense.h"
 
 #include <Eigen/QR>
+#include <Eigen/SVD>
+
+#include <algorithm>
 
 namespace ffrobot {
+
+MatrixXd matrix_product(const ConstMatrix &A, const ConstMatrix &B) { return A * B; }
+
+void add_transposed_product(const ConstMatrix &A, const ConstMatrix &B, Ref<MatrixXd> to, double factor) {
+  to.noalias() += factor * A.transpose() * B;
+}
 
 namespace {
 
@@ -33,5 +42,22 @@ VectorXd LeastNorm::solve_transposed(const VectorXd &c) const {
 }
 
 double determinant(const MatrixXd &A) { return A.determinant(); }
+
+RightVectors::RightVectors(const MatrixXd &A) : V(MatrixXd::Identity(A.cols(), A.cols())) {
+  if (A.size() == 0)
+    return;
+  const Eigen::JacobiSVD<MatrixXd> svd(A, Eigen::ComputeFullV);
+  values = svd.singularValues(), V = svd.matrixV();
+}
+
+Index RightVectors::rank(double dependent) const {
+  return values.size() ? (values.array() > dependent * std::max(values[0], 1.0)).count() : 0;
+}
+
+double RightVectors::ratio(Index rank) const {
+  if (rank == 0)
+    return 1;
+  return rank <= values.size() && values[0] > 0 ? values[rank - 1] / values[0] : 0;
+}
 
 } // namespace ffrobot
