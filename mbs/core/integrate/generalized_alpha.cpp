@@ -142,9 +142,7 @@ void GeneralizedAlpha::accept(double h) {
 }
 
 void GeneralizedAlpha::interpolate(double t, double *y) const {
-  const double x = (t - t0_) / h_, r = 1 - x;
-  Map<VectorXd>(y, 2 * n_) =
-      r * r * (1 + 2 * x) * start_ + x * x * (1 + 2 * r) * end_ + x * r * h_ * (r * first_slope_ - x * last_slope_);
+  Map<VectorXd>(y, 2 * n_) = hermite((t - t0_) / h_, h_, start_, end_, first_slope_, last_slope_);
 }
 
 } // namespace ffrobot

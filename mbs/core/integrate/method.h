@@ -77,6 +77,15 @@ protected:
   virtual double weight_of_rounding() const { return 1; } // of slopes in the estimate, twice the root of their squares
 };
 
+// Hermite's cubic at the part x of a step of length h, through its ends and slopes there
+template <class Vector>
+VectorXd hermite(double x, double h, const VectorXd &start, const Vector &end, const Vector &first_slope,
+                 const Vector &last_slope) {
+  const double left = 1 - x;
+  return left * left * (1 + 2 * x) * start + x * x * (1 + 2 * left) * end +
+         x * left * h * (left * first_slope - x * last_slope);
+}
+
 enum class MethodKind { dopri5, dop853, radau, generalized_alpha };
 
 struct MethodChoice {

@@ -58,12 +58,10 @@ void RecordedMotion::make_again(Step &step) {
 
 // Hermite's cubic through the recorded ends and their slopes, where the step cannot be made again.
 void RecordedMotion::between_ends(const Step &step, double t) {
-  using Values = Map<const VectorXd>;
+  const auto vector = [&](const double *x) { return Map<const VectorXd>(x, z_.size()); };
   Method &method = *step.method;
-  const Index n = z_.size();
-  const double x = (t - step.begin) / step.length, left = 1 - x;
-  z_ = left * left * (1 + 2 * x) * step.start + x * x * (3 - 2 * x) * Values(method.end(), n) +
-       step.length * x * left * (left * Values(method.first_slope(), n) - x * Values(method.last_slope(), n));
+  z_ = hermite((t - step.begin) / step.length, step.length, step.start, vector(method.end()),
+               vector(method.first_slope()), vector(method.last_slope()));
 }
 
 const double *RecordedMotion::evaluated(double t) {

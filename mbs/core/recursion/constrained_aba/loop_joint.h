@@ -2,10 +2,26 @@
 // as a moment or force on the second one and its opposite on the first.
 #pragma once
 
-#include "core/recursion/joint/friction.h"
 #include "core/recursion/mechanism/workspace.h"
 
 namespace ffrobot::recursion {
+
+// -(c v + tau_c tanh(v / v_s)) along a coordinate whose rate is v: viscous and Coulomb friction, the latter smooth
+// about rest.
+struct Friction {
+  double viscous = 0; // N s/m, or N m s
+  double coulomb = 0; // N, or N m
+  double speed = 1;   // m/s, or rad/s
+
+  double resistance(double rate) const { return viscous * rate + coulomb * std::tanh(rate / speed); }
+  double slope(double rate) const { // of the resistance
+    const double steady = std::cosh(rate / speed);
+    return viscous + coulomb / (speed * steady * steady);
+  }
+  bool acts() const { return viscous != 0 || coulomb != 0; }
+
+  FFROBOT_FIELDS(viscous, coulomb, speed);
+};
 
 // A coordinate of such a joint, of the section on which wrench b of the mechanism acts on that of wrench a: the turn
 // about (rad), or the way along (m), an axis of a.

@@ -118,16 +118,18 @@ template <int count, class T, int n> FFROBOT_INLINE void sums(const Pack<T, n> (
       to[i] = x[i].sum();
 }
 
-// f of the numbers 0 … n - 1 of arrays: f<w>(i) of those from i on that a Pack<double, w> holds, in registers of the
-// processor as long as they are full, then of what is left in shorter ones
-template <int width = native_lanes, class F> FFROBOT_INLINE void in_registers(long n, const F &f) {
-  if constexpr (width == native_lanes)
+template <class T> constexpr int full_width = std::is_same_v<T, double> ? native_lanes : 1;
+
+// f of the numbers 0 … n - 1 of arrays: f<w>(i) of those from i on that a Pack<T, w> holds, in registers of the
+// processor as long as they are full, then of what is left in shorter ones; of other scalars than doubles one by one
+template <class T = double, int width = full_width<T>, class F> FFROBOT_INLINE void in_registers(long n, const F &f) {
+  if constexpr (width == full_width<T>)
     for (long i = 0; i + width <= n; i += width)
       f.template operator()<width>(i);
   else if (n & width)
     f.template operator()<width>(n & -2 * width);
   if constexpr (width > 1)
-    in_registers<width / 2>(n, f);
+    in_registers<T, width / 2>(n, f);
 }
 
 // How many numbers a Pack of n takes in memory

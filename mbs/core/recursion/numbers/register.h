@@ -2,6 +2,7 @@
 // keep vectors that are longer than a register in memory.)
 #pragma once
 
+#include <bit>
 #include <cstdint>
 #include <cstring>
 #include <new>

@@ -109,58 +109,37 @@ template <class T> struct State {
 
 // --- W p, W p_dot, W (K p + D p_dot - force), p.p, p.p_dot; force (n) may be null
 
-FFROBOT_INLINE void project(const Body &b, const double *p, const double *v, const double *force, State<double> &s) {
+template <class T> FFROBOT_INLINE void project(const Body &b, const T *p, const T *v, const T *force, State<T> &s) {
   const long n = b.n;
-  auto pp = Pack<double, native_lanes>::zero(), pv = pp;
-  double pp_rest = 0, pv_rest = 0, *elastic = s.elastic.data();
-  in_registers(n, [&]<int w>(long i) {
-    using Part = Pack<double, w>;
+  auto pp = Pack<T, full_width<T>>::zero(), pv = pp;
+  T pp_rest(0.), pv_rest(0.), *elastic = s.elastic.data();
+  in_registers<T>(n, [&]<int w>(long i) {
+    using Part = Pack<T, w>;
     const Part x = Part::read(p + i), y = Part::read(v + i);
-    Part k = Part::read(b.K.data() + i) * x;
+    Part k = constant_row<w, T>(b.K.data() + i) * x;
     if (b.is_damped)
-      k += Part::read(b.D.data() + i) * y;
+      k += constant_row<w, T>(b.D.data() + i) * y;
     if (force)
       k -= Part::read(force + i);
     k.write(elastic + i);
-    if constexpr (w == native_lanes)
+    if constexpr (w == full_width<T>)
       pp += x * x, pv += x * y;
     else
       pp_rest += (x * x).sum(), pv_rest += (x * y).sum();
   });
   s.p_p = pp.sum() + pp_rest, s.p_v = pv.sum() + pv_rest;
   const auto multiply = [&](long block, auto width) {
-    Eight u = Eight::zero(), u_dot = u, k = u;
+    auto u = Pack<T, 8>::zero(), u_dot = u, k = u;
     const double *column = b.columns.data() + block;
 #pragma GCC unroll 2
-    for (long i = 0; i < n; ++i, column += width) {
-      const Eight w = Eight::load(column);
-      u += p[i] * w, u_dot += v[i] * w, k += elastic[i] * w;
-    }
-    u.store(s.u.data() + block), u_dot.store(s.u_dot.data() + block), k.store(s.Q.data() + block);
+    for (long i = 0; i < n; ++i, column += width)
+      add_scaled(p[i], column, u), add_scaled(v[i], column, u_dot), add_scaled(elastic[i], column, k);
+    u.write(s.u.data() + block), u_dot.write(s.u_dot.data() + block), k.write(s.Q.data() + block);
   };
   if (b.blocks == 1)
     return multiply(0, std::integral_constant<long, 8>());
   for (long block = 0; block < b.width(); block += 8)
     multiply(block, static_cast<long>(b.width()));
-}
-
-template <class T> inline void project(const Body &b, const T *p, const T *v, const T *force, State<T> &s) {
-  const int width = b.width();
-  s.p_p = s.p_v = T(0.);
-  for (int r = 0; r < width; ++r)
-    s.u[r] = s.u_dot[r] = s.Q[r] = T(0.);
-  for (int i = 0; i < b.n; ++i) {
-    T k = b.K[i] * p[i];
-    if (b.is_damped)
-      k += b.D[i] * v[i];
-    if (force)
-      k -= force[i];
-    s.elastic[i] = k;
-    s.p_p += p[i] * p[i], s.p_v += p[i] * v[i];
-    for (int r = 0; r < width; ++r)
-      if (const double w = b.columns[i * width + r]; w != 0)
-        s.u[r] += w * p[i], s.u_dot[r] += w * v[i], s.Q[r] += w * k;
-  }
 }
 
 } // namespace ffrobot::recursion::planar

@@ -99,21 +99,20 @@ template <class T> FFROBOT_INLINE Inertia<T> inertia(const Body &b, const State<
 
 // p_ddot = Q_f - m^T A + sum of P^T f, by multipliers without Q_f; z holds, by rows of W, -A and forces on ports, zeros
 // elsewhere (and becomes another with geometric stiffening)
-template <bool by_multipliers>
-FFROBOT_INLINE void modal_accelerations(const Body &b, const double *p, double *z, State<double> &s, double *a) {
+template <bool by_multipliers, class T>
+FFROBOT_INLINE void modal_accelerations(const Body &b, const T *p, T *z, State<T> &s, T *a) {
   if (b.has_more && b.stiffening)
     return s.bent.accelerate(z, by_multipliers, a);
-  const double ww = s.omega * s.omega, *elastic = s.elastic.data();
+  const T ww = s.omega * s.omega, *elastic = s.elastic.data();
   const long stride = b.padded, last = b.width() - 2;
-  in_registers(b.n, [&]<int w>(long i) {
-    using Part = Pack<double, w>;
-    const double *W = b.rows.data() + i;
-    const auto row = [&](long r) { return Part::read(W + r * stride); };
+  in_registers<T>(b.n, [&]<int w>(long i) {
+    using Part = Pack<T, w>;
+    const double *row = b.rows.data() + i;
     Part sum = Part::zero(), sum2 = sum;
     if (!by_multipliers)
       sum = ww * Part::read(p + i) - Part::read(elastic + i);
-    for (long r = 0; r <= last; r += 2)
-      sum += z[r] * row(r), sum2 += z[r + 1] * row(r + 1);
+    for (long r = 0; r <= last; r += 2, row += 2 * stride)
+      add_scaled(z[r], row, sum), add_scaled(z[r + 1], row + stride, sum2);
     if (b.has_more) {
       sum += z[2] * Part::read(s.h.data() + i);
       if (!by_multipliers)
@@ -121,22 +120,6 @@ FFROBOT_INLINE void modal_accelerations(const Body &b, const double *p, double *
     }
     (sum + sum2).write(a + i);
   });
-}
-
-template <bool by_multipliers, class T>
-inline void modal_accelerations(const Body &b, const T *p, T *z, State<T> &s, T *a) {
-  if (b.has_more && b.stiffening)
-    return s.bent.accelerate(z, by_multipliers, a);
-  const T ww = s.omega * s.omega;
-  for (int i = 0; i < b.n; ++i) {
-    T sum = by_multipliers ? T(0.) : T(ww * p[i] - s.elastic[i]);
-    for (int r = 0; r < b.width(); ++r)
-      if (const double w = b.columns[i * b.width() + r]; w != 0)
-        sum += w * z[r];
-    if (b.has_more)
-      sum += by_multipliers ? s.h[i] * z[2] : s.more[i] + s.h[i] * z[2];
-    a[i] = sum;
-  }
 }
 
 // The same of a body with one block (pin_joints.h)
