@@ -15,21 +15,6 @@ Booleans = NDArray[np.bool_]
 PPoly = Any  # scipy.interpolate.PPoly, of which type checkers know nothing, and which a start does not load
 
 
-def as_floats(values: NDArray[np.floating[Any]]) -> Array:
-    """Declare `values` as float64 to the type checker; `Array` takes what NumPy has of floats without it, too."""
-    return values.astype(np.float64, copy=False)
-
-
-def as_list(values: Array) -> list[float]:
-    """Convert a vector (n,) to Python floats."""
-    return values.tolist()
-
-
-def as_rows(values: NDArray[Any]) -> list[list[Any]]:
-    """Convert a matrix (m, n) to rows of Python numbers."""
-    return values.tolist()
-
-
 def null_space(J: Array, tolerance: float) -> Array:
     """Orthonormal columns (k, m) that J (r, k) takes to zero: to `tolerance` of its largest singular value."""
     _, sizes, V = np.linalg.svd(J)

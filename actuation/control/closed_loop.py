@@ -9,7 +9,7 @@ from io import StringIO
 
 import numpy as np
 
-from ...common.arrays import Array, as_list
+from ...common.arrays import Array
 from ...common.errors import InputError, SolveError
 from ...common.libraries import scipy
 from ...mbs._core import TimeFunction
@@ -256,7 +256,7 @@ def _feed_forward(
     """
     middle = np.minimum(times + analysis.delay + analysis.sample_time / 2, source.time[-1])
     most = largest_moments(context.model, limits=False)
-    values = supplied(source, most, context.patches, limited=not analysis.unlimited).sample(as_list(middle))
+    values = supplied(source, most, context.patches, limited=not analysis.unlimited).sample(middle.tolist())
     kind = "joints+pzt" if whole else analysis.feed_forward
     if kind == "none":
         values[:, : len(most)] = 0.0

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..common.arrays import Array, Integers, as_list, as_rows
+from ..common.arrays import Array, Integers
 from ..common.errors import InputError, blaming_file, check_known, naming, quoted
 from ..common.libraries import extras, scipy
 from ..common.structs import struct
@@ -109,7 +109,7 @@ def csv_text(motion: JointMotions) -> tuple[str, tuple[str, ...]]:
         if joint.moment is not None:
             columns[f"{joint.name}.moment"] = joint.moment
         columns |= {f"{joint.name}.{key}": values for key, values in joint.motor.items()}
-    return as_csv([columns, *as_rows(np.stack(list(columns.values()), axis=1))]), motion.remarks
+    return as_csv([columns, *np.stack(list(columns.values()), axis=1).tolist()]), motion.remarks
 
 
 def joint_trajectory(motion: JointMotions) -> tuple[dict[str, Any], tuple[str, ...]]:
@@ -146,7 +146,7 @@ def joint_trajectory(motion: JointMotions) -> tuple[dict[str, Any], tuple[str, .
             "time_from_start": dict(zip(("sec", "nanosec"), divmod(round((time - begin) * NANO), NANO), strict=True)),
         }
         for position, velocity, effort, time in zip(
-            as_rows(positions), as_rows(velocities), as_rows(efforts), as_list(motion.time), strict=True
+            positions.tolist(), velocities.tolist(), efforts.tolist(), motion.time.tolist(), strict=True
         )
     ]
     header = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
@@ -220,7 +220,7 @@ def read_record(path: Path) -> Recorded:
 
 def path_text(motion: Waypoints) -> str:
     """Return a CSV table of a motion: columns t (s) and the joints' names (rad or m), with all digits."""
-    rows = ([time, *row] for time, row in zip(as_list(motion.times), as_rows(motion.values), strict=True))
+    rows = ([time, *row] for time, row in zip(motion.times.tolist(), motion.values.tolist(), strict=True))
     return as_csv([["t", *motion.columns], *rows])
 
 
@@ -444,4 +444,4 @@ def _together(samples: Mapping[str, list[Sample]], remarks: list[str]) -> Record
         own = (at[once] - times[0]) / NANO
         columns.append(scipy.interpolate.CubicSpline(own, values[once])((times - times[0]) / NANO))
     table = np.stack([(times - times[0]) / NANO, *columns], axis=1)
-    return _record(list(series), [(row[0], row[1:]) for row in as_rows(table)], [None], *remarks)
+    return _record(list(series), [(row[0], row[1:]) for row in table.tolist()], [None], *remarks)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..common.arrays import Array, as_list
+from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.toml_files import toml_text
 from ..mesh.checks import METRES
@@ -152,8 +152,8 @@ def _widest(part: Inspection, x: Array) -> Array:
         return next((face.direction for face in planes if abs(face.direction @ axes[1]) > NEARLY), axes[1])
     along = [face for face in planes if abs(face.direction @ x) < SQUARE]
     large = [face.direction for face in along if face.area > (1 - ALIKE) * along[0].area]
-    return max(large, key=lambda normal: as_list(normal[::-1].round(3)), default=axes[1])
+    return max(large, key=lambda normal: normal[::-1].round(3).tolist(), default=axes[1])
 
 
 def _numbers(vector: Array) -> list[float]:
-    return [value + 0.0 for value in as_list(np.round(vector, DIGITS))]  # no −0.0
+    return [value + 0.0 for value in np.round(vector, DIGITS).tolist()]  # no −0.0

@@ -9,7 +9,7 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import model_validator
 
-from ...common.arrays import Array, Indices, as_list
+from ...common.arrays import Array, Indices
 from ...common.errors import InputError, SolveError
 from .. import _core
 from .._core import TimeFunction
@@ -176,7 +176,7 @@ def _static(model: Model, bodies: Bodies, analysis: Fcid, motion: PrescribedMoti
     def forces(p: Array, at: Indices) -> Array:
         nonlocal near
         first = near[at] if len(near) else posture[None]  # from there one after the other
-        q, left = motion.left_on_modes(as_list(nodes[at]), p, 0 * p, 0 * p, first)
+        q, left = motion.left_on_modes(nodes[at].tolist(), p, 0 * p, 0 * p, first)
         near = near if len(near) else q
         near[at] = q
         return left

@@ -8,7 +8,7 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import model_validator
 
-from ...common.arrays import Array, as_list
+from ...common.arrays import Array
 from ...common.errors import InputError, either
 from .. import _core
 from ..fields.waypoints import spline
@@ -203,7 +203,7 @@ def _supplied(source: Run, most: Array, patches: Mapping[str, PatchedLink], anal
     grid, closer = np.linspace(times[0], times[-1], count + 1), source.closer
     current = closer.v @ strain_directions(source.model, patches).T
     strain = np.stack([np.interp(grid, closer.time, of) for of in current.T], axis=1)
-    V = amplifiers.output(grid, forces.sample(as_list(grid))[:, len(most) :], strain)
+    V = amplifiers.output(grid, forces.sample(grid.tolist())[:, len(most) :], strain)
     return _core.ForcesOfBoth(
         supplied(source, most, {}, limited=analysis.limits), _core.ForcesOfTime(spline(grid, V, 1))
     )

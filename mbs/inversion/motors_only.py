@@ -15,7 +15,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from ...common.arrays import Array, PPoly, as_list
+from ...common.arrays import Array, PPoly
 from ...common.errors import InputError, SolveError
 from ...common.keys import MOST_OUTPUTS
 from ...common.structs import struct
@@ -223,7 +223,7 @@ def outcome_along(
 ) -> Run:
     """The motion whose modes follow `curve` (n,), m·√kg, at `times` (T,), s, up to the first without a posture."""
     modes = curve(times), curve.derivative(1)(times), curve.derivative(2)(times)
-    states = servo.motion.motion(as_list(times), *modes, servo.postures(times))
+    states = servo.motion.motion(times.tolist(), *modes, servo.postures(times))
     is_met = np.isfinite(states.q).all(axis=1)
     kept = slice(len(times) if is_met.all() else int(is_met.argmin()))
     columns = iter(curve.c.transpose(2, 1, 0))

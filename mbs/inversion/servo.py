@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...common.arrays import Array, Indices, as_list
+from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...common.libraries import scipy
 from ...common.structs import struct
@@ -127,12 +127,12 @@ class Servo:
             if not self.goes_on():
                 raise Stopped
             part = slice(k, k + MOST_STATES)
-            r[part] = self.motion.left_on_modes(as_list(times[part]), p[part], v[part], a[part], near[part])[1]
+            r[part] = self.motion.left_on_modes(times[part].tolist(), p[part], v[part], a[part], near[part])[1]
         return r
 
     def forces(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array]:
         """`residuals` r (N, n), N/√kg, and motor torques τ (N, motors), N·m or N."""
-        states = self.motion.motion(as_list(times), p, v, a, self.postures(times))
+        states = self.motion.motion(times.tolist(), p, v, a, self.postures(times))
         return states.left[:, self.of_modes], states.tau
 
     def quasi_static(self, times: Array, p: Array) -> Array:
@@ -182,7 +182,7 @@ def make_servo(model: Model, end: float, where: str, goes_on: Callable[[], bool]
     servo = Servo(held, end, 1.0, times, start[None], where=where, goes_on=goes_on)
     modes = np.tile(np.concatenate([start[node.p_q] for node in model.tree.nodes]), (POSTURES, 1))
     rest = np.zeros_like(modes)
-    near: Array = servo.motion.motion(as_list(times), modes, rest, rest, start[None]).q
+    near: Array = servo.motion.motion(times.tolist(), modes, rest, rest, start[None]).q
     for k in np.flatnonzero(~np.isfinite(near).all(axis=1)):  # where rates have no limits, as in singular postures
         q = held.constraints.posture(near[k - 1] if k else start, float(times[k]))
         if q is None:

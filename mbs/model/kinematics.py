@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, Booleans, as_list
+from ...common.arrays import Array, Booleans
 from .. import _core
 from ..fields.orientations import OrientationLaw
 from .body import Body
@@ -219,12 +219,12 @@ class Kinematics:
 
     def values(self, q: Array, times: Array) -> tuple[Array, Array]:
         """C (T, rows), m or rad, at q (T, n_q) and `times` (T,), s, and its Jacobian C_v (T, rows, n_v)."""
-        values, gradients = self.core.constraints(self.scene, as_list(times), q)
+        values, gradients = self.core.constraints(self.scene, times.tolist(), q)
         return self.signs * values, self.signs[:, None] * gradients.reshape(len(q), len(self.signs), self.core.n_v)
 
     def rates(self, q: Array, v: Array, times: Array) -> Array:
         """Ċ (T, rows), m/s or rad/s, at q (T, n_q), v (T, n_v) and `times` (T,), s."""
-        return self.signs * self.core.constraint_rates(self.scene, as_list(times), q, v)
+        return self.signs * self.core.constraint_rates(self.scene, times.tolist(), q, v)
 
 
 class Places:

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...common.arrays import Array, Booleans, Indices, as_list
+from ...common.arrays import Array, Booleans, Indices
 from ...common.structs import struct
 from ..scene.mechanism import MechanismScene
 from .drives import Drive
@@ -92,7 +92,7 @@ class Constraints(Kinematics):
         # Coordinates by themselves have no branches
         farthest = np.inf if all(row.kind == "coordinate" for row in self._rows) else LARGEST_TURN
         return self.core.postures(
-            self.scene, as_list(times), q, beside=more, scales=scales, sizes=self._row_sizes, largest_step=farthest
+            self.scene, times.tolist(), q, beside=more, scales=scales, sizes=self._row_sizes, largest_step=farthest
         )
 
 

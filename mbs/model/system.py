@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, Booleans, Integers, as_list
+from ...common.arrays import Array, Booleans, Integers
 from ...common.errors import InputError
 from ...common.rotations import left_jacobian, left_jacobian_slope
 from ...common.structs import struct
@@ -275,7 +275,7 @@ def _add_motors(driven: _core.PlanarDriven | _core.SpatialDriven, model: Model) 
 
 def path_forces(model: Model, times: Array, q: Array, multipliers: Array) -> Array:
     """Generalized forces −C_sᵀλ_s (T, n_v), N, N·m, N/√kg, of path constraints with multipliers λ (T, rows)."""
-    return driven_mechanism(model).path_forces(as_list(times), q, multipliers * model.row_signs)
+    return driven_mechanism(model).path_forces(times.tolist(), q, multipliers * model.row_signs)
 
 
 def frames_in_core(model: Model, q: Array) -> list[tuple[Array, Array]]:
@@ -291,7 +291,7 @@ def frames_in_core(model: Model, q: Array) -> list[tuple[Array, Array]]:
 def path_forces_on_bodies(model: Model, times: Array, q: Array, multipliers: Array) -> dict[str, Array]:
     """Return, by body, path forces (T, 6 + n) on it: N, N·m on its frame in its axes, N/√kg on its modes."""
     driven = driven_mechanism(model, has_motors=False)
-    on_bodies = driven.path_forces_on_bodies(as_list(times), q, multipliers * model.row_signs)
+    on_bodies = driven.path_forces_on_bodies(times.tolist(), q, multipliers * model.row_signs)
     by_body = {}
     for node, (axes, origin), forces in zip(model.tree.nodes, frames_in_core(model, q[0]), on_bodies, strict=True):
         force, moment = forces[:, :3], forces[:, 3:6]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...common.arrays import Array, Booleans, Indices, as_list
+from ...common.arrays import Array, Booleans, Indices
 from ...common.errors import InputError, quoted
 from ...common.structs import struct
 from .. import _core
@@ -47,13 +47,13 @@ def mobilities(model: Model, q: Array, times: Array, loop_rank: int = -1) -> lis
     `loop_rank` is their rank with straight ones.
     """
     constraints, is_path = model.constraints, (~model.loop_rows).tolist()
-    return constraints.core.mobilities(constraints.scene, as_list(times), q, is_path, model.size, loop_rank)
+    return constraints.core.mobilities(constraints.scene, times.tolist(), q, is_path, model.size, loop_rank)
 
 
 def singular_ratios(model: Model, q: Array, times: Array, rank: int) -> Array:
     """Return ratios (T,) of smallest to largest of `rank` singular values of all rows: see `mobilities`."""
     constraints, is_path = model.constraints, [False] * len(model.rows)
-    motions = constraints.core.mobilities(constraints.scene, as_list(times), q, is_path, model.size, rank)
+    motions = constraints.core.mobilities(constraints.scene, times.tolist(), q, is_path, model.size, rank)
     return np.array([at.loop_ratio for at in motions])
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, as_list
+from ...common.arrays import Array
 from ...common.errors import SolveError
 from .. import _core
 from .._core import TimeFunction
@@ -47,7 +47,7 @@ def prescribed_motion(model: Model, motion: PrescribedMotion, modes: Array, time
 
     Raises `SolveError` where no posture meets the rows.
     """
-    states = motion.motion(as_list(times), modes[0], modes[1], modes[2], near)
+    states = motion.motion(times.tolist(), modes[0], modes[1], modes[2], near)
     is_met = np.isfinite(states.q).all(axis=1)
     if not is_met.all():
         raise SolveError(
@@ -64,7 +64,7 @@ def left_slopes(
 
     At `times` (T,), s, with `modes` p, ṗ, p̈ (T, n), m·√kg and s, and postures near (T, n_q). Without motors: n rows.
     """
-    at, n = as_list(times), modes[0].shape[1]
+    at, n = times.tolist(), modes[0].shape[1]
     M, D, K = (x.reshape(len(times), -1, n) for x in motion.derivatives(at, *modes, near))
     turning = turning_motors(model)
     if turning and M.shape[1] > n:

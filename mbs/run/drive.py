@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...common.arrays import Array, Indices, as_list
+from ...common.arrays import Array, Indices
 from ...common.errors import InputError
 from ...common.structs import struct
 from .. import _core
@@ -190,15 +190,15 @@ class _Integration:
             methods=[(METHODS[one.name], one.cost, one.pace) for one in candidates],
             spectral_radius=analysis.spectral_radius,
         )
-        controls.keep_steps, controls.stops = analysis.keep_steps, as_list(self.ends)
+        controls.keep_steps, controls.stops = analysis.keep_steps, self.ends.tolist()
         if analysis.repeat_steps is not None:
-            controls.repeated_steps = as_list(analysis.repeat_steps.ends)
+            controls.repeated_steps = analysis.repeat_steps.ends.tolist()
         return controls
 
     def run(self, start: State, progress: Progress) -> _core.TreeRun:
         """Integrate in the core from `start`, or from where an earlier run has stopped."""
         (core, scene, _), control, continuation = self.system.integrated, self.control, self.continuation
-        common: dict[str, Any] = dict(model=core, scene=scene, times=as_list(self.times), q=start.q, v=start.v)
+        common: dict[str, Any] = dict(model=core, scene=scene, times=self.times.tolist(), q=start.q, v=start.v)
         common.update(controls=self.controls, carry_on=progress)
         if control is None:
             # Where motors take the place of forces on a path their errors count, too
@@ -215,7 +215,7 @@ class _Integration:
             **common,
             held=zero_order_hold(self.system.model, control.commands),
             first_command=control.first,
-            samples=as_list(control.times),
+            samples=control.times.tolist(),
             delay=control.delay,
             controller=control.controller,
             between=continuation.samples,
@@ -278,7 +278,7 @@ class _Integration:
         """Return what a replay applies (T, numbers) at the times of `motion`; `run` lacks the `known` first ones."""
         if self.drives.replayed is None:
             return np.zeros((len(motion.time), 0))
-        before = self.drives.replayed.source.sample(as_list(motion.time[:known]))
+        before = self.drives.replayed.source.sample(motion.time[:known].tolist())
         return np.concatenate([before, run.replayed[known:]]) if known else run.replayed
 
     def under(self, motion: Run, replayed: Array) -> Run:
@@ -310,7 +310,7 @@ class _Integration:
             ends = np.append(ends, both)
 
         def at(rows: Indices) -> _core.TreeRun:
-            chosen, of_rows = as_list(times[rows]), np.ascontiguousarray(states[rows])
+            chosen, of_rows = times[rows].tolist(), np.ascontiguousarray(states[rows])
             if control is None:
                 return _core.tree_outputs(core, scene, chosen, of_rows, self.system.replay)
             held = zero_order_hold(self.system.model, control.commands)

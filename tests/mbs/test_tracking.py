@@ -15,7 +15,6 @@ from internal_inertia import Chain, changes
 from patch_sets import amplifiers
 
 import ffrobot
-from ffrobot.common.arrays import as_list
 from ffrobot.fe_models.link_source import link_keys
 from ffrobot.mbs.inversion.servo import make_servo
 from ffrobot.mbs.inversion.zero_dynamics import equilibrium, linearise, shape_along
@@ -360,7 +359,7 @@ def test_least_effort():
     assert np.abs(tau - [0.1240302, 0.5080775, 0.8311328, -0.0001646, -0.5071881]).max() < 2e-6
     expected = [[25.7578, 60.4196, 94.4616, 38.1730], [0.332613, 0.727236, 1.187379, 0.473746]]
     assert np.abs(found.voltage(times[:2]) - expected).max() < 2e-3
-    state = servo.motion.motion(as_list(times), *motion, servo.postures(times))
+    state = servo.motion.motion(times.tolist(), *motion, servo.postures(times))
     assert np.isfinite(state.q).all()
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...common.arrays import Array, as_list
+from ...common.arrays import Array
 from ...common.errors import InputError, did_you_mean
 from ...common.rotations import unit
 from ...common.structs import struct
@@ -122,7 +122,7 @@ def _interfaces(
             point_of[joint.name] = point = names[joint.name]
             if point in taken:
                 continue
-            position: float | list[float] = as_list(x)  # of a solid, whose nearest face is taken
+            position: float | list[float] = x.tolist()  # of a solid, whose nearest face is taken
             if keys["geometry"].get("kind", "beam") != "solid":
                 position, off = float(x[0]), float(np.linalg.norm(x[1:]))
                 if off > ON_AXIS * length or not 0 < x[0] < length:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...common.arrays import Array, as_rows
+from ...common.arrays import Array
 from ...common.errors import InputError, quoted, refuse
 from ...common.rotations import rpy_of
 from ...common.tables import shown
@@ -149,7 +149,7 @@ def _wrong_inertias(bodies: list[MergedLinks]) -> Iterator[str]:
         if body.flexible:
             continue
         try:
-            xx, yy, zz = (tuple(row) for row in as_rows(body.inertial.inertia))
+            xx, yy, zz = (tuple(row) for row in body.inertial.inertia.tolist())
             check_inertia((xx, yy, zz))
         except ValueError as error:
             least, _, largest = np.linalg.eigvalsh(least_change(body.inertial.inertia))
