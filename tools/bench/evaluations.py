@@ -112,7 +112,7 @@ def _arm_3d(links: int, link: Mapping[str, Any], rows: int | None = None) -> Cal
         trajectory=_path(f"{names[-1]}.tip", rows),
         analysis=[{"name": "moves", "kind": "pcid" if rows else "forward", "end": 1.0, "output_step": 1.0}],
     )
-    model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None)])
+    model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None).values()])
     core, rng = MultibodySystem(model).core, np.random.default_rng(1)
     q, v = rng.uniform(-1.0, 1.0, (2, core.n_v))
     for node in model.tree.nodes:
