@@ -110,7 +110,8 @@ def _results(results: Results) -> str:
     lines = [f"results of scene {results.name!r}, made by ffrobot {results.ffrobot_version}"]
     for name, body in results.modal_files.items():
         lines.append(f"body {name}: {body.path} (sha256 {body.sha256[:12]})")
-    analyses = Table("analysis", "kind", "status", "outputs", "up to t (s)", "steps", "evaluations", "wall (s)")
+    headers = ("analysis", "kind", "status", "outputs", "up to t (s)", "steps", "evaluations", "wall (s)")
+    analyses = Table(*headers)
     datasets = Table("dataset", "shape", "unit", "what")
     for name in results.analyses:
         time, about = results.time(name), results.attributes(name)

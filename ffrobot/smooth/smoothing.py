@@ -66,7 +66,16 @@ class Smoothed:
         """The motion as it is."""
         of, ride = self.before.recording, self.before.ride
         shares = (np.vstack([self.before.peaks, ride.torque]) / self.limits.sizes).max(axis=1)
-        return Candidate("as it is", of.times, of.values, None, ride, 0.0, float(shares[:3].max()), float(shares[3]))
+        return Candidate(
+            "as it is",
+            of.times,
+            of.values,
+            None,
+            ride,
+            off_path=0.0,
+            excess=float(shares[:3].max()),
+            torque=float(shares[3]),
+        )
 
     def write(self, output: AnyPath, *, force: bool = False) -> None:
         """Write the best motion as a JointTrajectory (`.json`), a table (`.csv`) or a bag of ROS 2 (`.rosbag2`).

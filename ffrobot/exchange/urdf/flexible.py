@@ -70,7 +70,7 @@ def flexible_link(robot: Robot, name: str, source: Path, folder: Path, stem: str
     read_link(table)
     if part is not None:
         geometry["file"] = os.path.relpath(part, folder.resolve())
-    return ImportedLink(name, file_name, place, keys, table, point_of, tuple(remarks))
+    return ImportedLink(name, file_name, place, keys, table, point_of=point_of, remarks=tuple(remarks))
 
 
 def _axes(robot: Robot, name: str, tip: UrdfJoint | None) -> Array:
