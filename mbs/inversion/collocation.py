@@ -58,18 +58,23 @@ def gauss(stages: int = STAGES, *, of_second_order: bool = False) -> Scheme:
 GAUSS, OF_SECOND_ORDER = gauss(), gauss(of_second_order=True)
 
 
+def between(breaks: Array, xi: Array) -> Array:
+    """Times (N · S,), s, at shares ξ (S,) of each of the intervals between `breaks` (N + 1,), s."""
+    return (breaks[:-1, None] + np.diff(breaks)[:, None] * xi).ravel()
+
+
 @struct
 class Problem:
     """The equations, for N nodes at once: times (N,), p, ṗ, p̈ (N, n).
 
-    residual(times, p, ṗ, p̈) gives r (N, n). derivatives(times) gives ∂r/∂p̈, ∂r/∂ṗ, ∂r/∂p, each (N, n, n): they only
+    residual(times, p, ṗ, p̈) is r (N, n). derivatives(times) are ∂r/∂p̈, ∂r/∂ṗ, ∂r/∂p (3, N, n, n): they only
     set the pace of Newton's method. `scale` (n,) is about |ṗ|/|p|, 1/s, `size` a typical |scale · p|. All conditions at
     the start make it an initial value problem; then intervals have to resolve vibrations, or those of varying equations
     grow.
     """
 
     residual: Callable[[Array, Array, Array, Array], Array]
-    derivatives: Callable[[Array], tuple[Array, Array, Array]]
+    derivatives: Callable[[Array], Array]
     scale: Array
     size: float
     start: Boundary
@@ -90,24 +95,21 @@ class Found:
     worst: float
 
 
-def collocate(problem: Problem, breaks: Array, guess: Callable[[Array], tuple[Array, Array, Array]]) -> Found:
-    """Solve on the given breaks (N+1,) from a guess of (p, ṗ, p̈) at any times."""
-    h = np.diff(breaks)
-    times = breaks[:-1, None] + h[:, None] * problem.scheme.c
-    n = len(problem.scale)
-    derivatives = [x.reshape(*times.shape, n, n) for x in problem.derivatives(times.ravel())]
-    linear = _LinearSystem(problem, breaks, derivatives)
-    p, v = guess(breaks)[:2]
-    K = guess(times.ravel())[2].reshape(*times.shape, n)
+def collocate(problem: Problem, breaks: Array, guess: PPoly) -> Found:
+    """Solve on the given breaks (N+1,) from a `guess` of p(t), (n,) values."""
+    h, times = np.diff(breaks), between(breaks, problem.scheme.c)
+    N, s, n = len(h), len(problem.scheme.c), len(problem.scale)
+    linear = _LinearSystem(problem, breaks, [x.reshape(N, s, n, n) for x in problem.derivatives(times)])
+    p, v, K = guess(breaks), guess(breaks, 1), guess(times, 2).reshape(N, s, n)
     previous, converged, iteration, worst = np.inf, False, 0, float(breaks[0])
     while not converged and iteration < MOST_ITERATIONS:
         iteration += 1
         stages = stage_states(problem.scheme, h, p, v, K)
-        r = problem.residual(times.ravel(), *(x.reshape(-1, n) for x in (*stages, K))).reshape(K.shape)
-        if not np.all(np.isfinite(r)):
-            worst = float(times[~np.isfinite(r).all(axis=2)][0])
+        r = problem.residual(times, *(x.reshape(-1, n) for x in (*stages, K)))
+        if not (is_finite := np.isfinite(r).all(axis=1)).all():
+            worst = float(times[is_finite.argmin()])
             break
-        p_step, v_step, K_step = linear.solve(r, p, v, K)
+        p_step, v_step, K_step = linear.solve(r.reshape(N, s, n), p, v, K)
         p, v, K = p + p_step, v + v_step, K + K_step
         peak = max(np.abs(problem.scale * p).max(), np.abs(v).max(), problem.size)
         steps = np.maximum(np.abs(problem.scale * p_step), np.abs(v_step)).max(axis=1) / peak
@@ -147,9 +149,8 @@ class Elimination:
         self.scheme, self.h = scheme, h
         N, s, n = M.shape[:3]
         h = h[:, None, None, None, None]
-        E = h * scheme.stage_once[:, None, :, None] * D[:, :, :, None] + h**2 * (
-            scheme.stage_twice[:, None, :, None] * K[:, :, :, None]
-        )  # (N, s, n, s, n)
+        once, twice = (h**k * a[:, None, :, None] for k, a in ((1, scheme.stage_once), (2, scheme.stage_twice)))
+        E = once * D[:, :, :, None] + twice * K[:, :, :, None]  # (N, s, n, s, n)
         for i in range(s):
             E[:, i, :, i] += M[:, i]
         self.G = np.concatenate([K, D + scheme.c[:, None, None] * h[..., 0] * K], axis=3).reshape(N, s * n, 2 * n)

@@ -7,7 +7,7 @@ the part of the vibration that the output does not see.
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import KW_ONLY, replace
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -72,11 +72,11 @@ def describe_zeros(linear: Linearisation) -> str:
     return shown if len(shown) < 120 else ", ".join(shown.split(", ")[:4]) + f" … ({len(unstable)} in all)"
 
 
-def check_rest(servo: Servo, analysis: TimedAnalysis, ends: Sequence[float]) -> None:
+def check_rest(servo: Servo, analysis: TimedAnalysis, ends: Iterable[float]) -> None:
     """Raise `InputError` for a path that moves at one of the `ends` (s), where the robot has to be at rest."""
-    targets = [(path.name, *target) for path in servo.model.scene.trajectory for target in path.targets]
+    targets = ((path.name, *target) for path in servo.model.scene.trajectory for target in path.targets)
     for name, component, function in targets:
-        largest = float(np.abs(function.sample(np.linspace(0.0, analysis.end, 101))[0]).max())
+        largest = np.abs(function.sample(np.linspace(0.0, analysis.end, 101))[0]).max()
         for t in ends:
             rate = function(t)[1]
             if abs(rate) * analysis.end > REST * largest:
@@ -96,7 +96,7 @@ def decay_times(linear: Linearisation, *, needs_future: bool) -> tuple[float, fl
     return pre, min(DECAY / decay.min(initial=np.inf), end) if needs_future else 0.0
 
 
-def durations(linear: Linearisation, given: tuple[float | None, float | None], step: float) -> tuple[float, float]:
+def durations(linear: Linearisation, given: Iterable[float | None], step: float) -> tuple[float, float]:
     """Pre- and post-actuation (s): as given, or until the zero dynamics has died out; whole output steps (s)."""
     automatic = decay_times(linear, needs_future=bool(linear.is_future[0].any()))
     chosen = (duration if value is None else value for value, duration in zip(given, automatic, strict=True))
@@ -106,15 +106,15 @@ def durations(linear: Linearisation, given: tuple[float | None, float | None], s
 
 def cause_of(inversion: Inversion) -> str:
     """Why no motion was found and when it was worst; where zeros change sides, no bounded one need exist."""
-    linear = inversion.linearisation
-    if inversion.status not in ("inversion not converged", "mesh too coarse"):
+    linear, is_coarse = inversion.linearisation, inversion.status == "mesh too coarse"
+    if not is_coarse and inversion.status != "inversion not converged":
         return ""
     count = (linear.is_future if linear.is_light.any() else is_unstable(linear.zeros)).sum(axis=1)
     changed = np.flatnonzero(count != count[0])
-    if inversion.status == "inversion not converged" and linear.singular_after:
+    if not is_coarse and linear.singular_after:
         k = linear.singular_after[0]
         return f"singular coupling between t = {linear.times[k]:.4g} and {linear.times[k + 1]:.4g} s, {INFINITE}"
-    if inversion.status == "mesh too coarse" or not len(changed):
+    if is_coarse or not len(changed):
         return f"{ADVICE[inversion.status]} (worst at t = {inversion.worst:.4g} s)"
     k = int(changed[0])
     return (
@@ -198,31 +198,30 @@ class MotorsOnly(TimedAnalysis):
         run = _run(self, model, inversion, times)
         if not len(run.time):
             raise SolveError(f"{servo.where}: no motion was found ({inversion.status}): {cause_of(inversion)}")
-        seconds = time.perf_counter() - began
         around = AroundPath(pre_actuation=pre, post_actuation=post, inversion=inversion, held=inversion.servo.model)
-        statistics = replace(run.statistics, wall_seconds=seconds, warnings=_warnings(inversion, run))
+        warnings = _warnings(inversion, run)
+        statistics = replace(run.statistics, wall_seconds=time.perf_counter() - began, warnings=warnings)
         run = replace(run, details=around, statistics=statistics)
         return run.with_look(lambda between: replace(_run(self, model, inversion, between), details=around))
 
 
 def _run(analysis: MotorsOnly, model: Model, inversion: Inversion, times: Array) -> Run:
-    curve = inversion.curve
     how = "two-point problem" if inversion.linearisation.is_future[0].any() else "integrated forward"
     statistics = Statistics(
         inversion.status,
         Choice("collocation", how),
-        steps=len(curve.x) - 1,
+        steps=len(inversion.curve.x) - 1,
         evaluations=inversion.iterations,
         cause=cause_of(inversion),
     )
-    return outcome_along(curve, inversion.servo, analysis, model, statistics, times)
+    return outcome_along(inversion.curve, inversion.servo, analysis, model, statistics, times)
 
 
 def outcome_along(
     curve: PPoly, servo: Servo, analysis: Analysis, model: Model, statistics: Statistics, times: Array
 ) -> Run:
     """The motion whose modes follow `curve` (n,), m·√kg, at `times` (T,), s, up to the first without a posture."""
-    modes = curve(times), curve.derivative(1)(times), curve.derivative(2)(times)
+    modes = curve(times), curve(times, 1), curve(times, 2)
     states = servo.motion.motion(times.tolist(), *modes, servo.postures(times))
     is_met = np.isfinite(states.q).all(axis=1)
     kept = slice(len(times) if is_met.all() else int(is_met.argmin()))
@@ -252,29 +251,28 @@ def _warnings(inversion: Inversion, run: Run) -> tuple[str, ...]:
     held = inversion.servo.model
     errors = {name: float(np.abs(off).max(initial=0.0)) for name, off in held.path_errors(run.time, run.q).items()}
     farthest = max(held.scene.trajectory, key=lambda path: errors[path.name])
-    joint = next((one for one in held.scene.joint if one.name == farthest.joint), None)
+    off, joint = errors[farthest.name], next((one for one in held.scene.joint if one.name == farthest.joint), None)
     turns = farthest.angle is not None if joint is None else joint.units == ("rad",)
-    if errors[farthest.name] <= PATH_TOLERANCE * (1.0 if turns else held.size):
+    if off <= PATH_TOLERANCE * (1.0 if turns else held.size):
         return ()
     unit, scale = ("m or rad", 1) if farthest.orientation is not None else ("rad", 1) if turns else ("mm", 1e3)
     return (
         f"a point with {inversion.servo.factor:.2g} of the vibration follows the path: that of trajectory"
-        f' "{farthest.name}" is off by up to {scale * errors[farthest.name]:.3g} {unit}',
+        f' "{farthest.name}" is off by up to {scale * off:.3g} {unit}',
     )
 
 
 def _choose_output(servo: Servo, analysis: MotorsOnly) -> tuple[Servo, Linearisation]:
-    """Choose the output to follow the path: the scene's, or the minimum-phase one nearest to the point itself.
-
-    Raises `InputError` where some time of the path the motors cannot accelerate it.
-    """
+    """Choose the output to follow the path: the scene's, or the minimum-phase one nearest to the point itself."""
     end, where = analysis.end, servo.where
     if analysis.output == "tip" or analysis.factor is not None:
-        servo = servo if analysis.output == "tip" else replace(servo, factor=float(analysis.factor or 0.0))
+        if analysis.factor is not None:
+            servo = replace(servo, factor=analysis.factor)
         linear = linearise(servo, end)
         values = np.linalg.svd(linear.dynamics.M, compute_uv=False)
-        worst = int((values[:, -1] / values[:, 0]).argmin())
-        if values[worst, -1] < SINGULAR * values[worst, 0]:
+        ratios = values[:, -1] / values[:, 0]
+        worst = int(ratios.argmin())
+        if ratios[worst] < SINGULAR:
             raise InputError(
                 f"{where}: expected motors that accelerate every component of the path",
                 f"at t = {linear.times[worst]:.4g} s a singular coupling, {INFINITE}",

@@ -107,8 +107,7 @@ class Servo:
         path = driven_mechanism(self.model)
         motion = _core.SpatialPrescribedMotion(path, self.near[0])
         if self.factor != 1.0 or self.offset:
-            has_loops = self.model.loop_rows.any()
-            driven = driven_mechanism(following_motors(self.model)) if has_loops else path
+            driven = driven_mechanism(following_motors(self.model)) if self.model.loop_rows.any() else path
             motion = _core.SpatialRedefinedMotion(driven, path, self.near[0], self.factor, list(self.offset))
         motion.hold_loads(0.0, self.end)
         return motion
@@ -203,8 +202,8 @@ def through(times: Array, values: Array) -> TimeFunction:
 
 
 def _with_functions(row: ConstraintRow, change: Callable[[TimeFunction], TimeFunction]) -> ConstraintRow:
-    target = None if row.target is None else change(row.target)
-    law = row.law
-    if law is not None:
-        law = replace(law, functions=tuple(change(function) for function in law.functions))
-    return replace(row, target=target, law=law)
+    if row.target is not None:
+        row = replace(row, target=change(row.target))
+    if row.law is not None:
+        row = replace(row, law=replace(row.law, functions=tuple(map(change, row.law.functions))))
+    return row

@@ -9,6 +9,7 @@ initial value problem, solved window by window, each with intervals as short as 
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +19,7 @@ from ...common.errors import SolveError
 from ...common.libraries import scipy
 from ...common.structs import struct
 from .. import _core
-from .collocation import GAUSS, OF_SECOND_ORDER, Boundary, Problem, collocate
+from .collocation import GAUSS, OF_SECOND_ORDER, Boundary, Problem, between, collocate
 from .servo import Servo, Stopped
 from .zero_dynamics import Linearisation, equilibrium, first_order, linear_dynamics
 
@@ -31,12 +32,6 @@ MOST_PLACES = 200  # along a motion at which derivatives are taken again
 MOST_PARTS = 6  # an interval is cut into at once
 TINY = 1e-300
 PROBES = np.sort(np.concatenate([(GAUSS.c[1:] + GAUSS.c[:-1]) / 2, [0.01, 0.5, 0.99]]))  # where r is looked at
-
-States = Callable[[Array], tuple[Array, Array, Array]]
-"""(p, ṗ, p̈), each (N, n), at any times (N,)."""
-
-Derivatives = Callable[[Array], tuple[Array, Array, Array]]
-"""M, D and K, each (N, n, n), at any times (N,)."""
 
 
 @struct
@@ -68,8 +63,7 @@ def invert(
     """
     end = float(linear.times[-1])
     start, finish = _boundaries(servo, linear, -pre, end + post)
-    size = max(TINY, float(np.abs(servo.scale * linear.shape).max()))
-    force = max(TINY, float(np.abs(servo.scale**2 * linear.shape).max()))
+    size, force = (max(TINY, float(np.abs(servo.scale**k * linear.shape).max())) for k in (1, 2))
     schemes = [OF_SECOND_ORDER] if not linear.is_light.any() else [GAUSS]
     if linear.singular_after:  # either may lose the p̈ that has no factor for a moment
         schemes = [GAUSS, OF_SECOND_ORDER]
@@ -89,9 +83,8 @@ def invert(
         if solver.status in ("completed", "interrupted"):
             break
     assert solver.curve is not None
-    p, v, _ = _states(solver.curve)(solver.curve.x)
-    rest = start.state[: len(servo.scale)]
-    away = np.hypot(np.linalg.norm(servo.scale * (p - rest), axis=1), np.linalg.norm(v, axis=1))
+    off = np.hstack([solver.curve(solver.curve.x), solver.curve(solver.curve.x, 1)]) - start.state
+    away = np.linalg.norm(off * np.append(servo.scale, np.ones_like(servo.scale)), axis=1)
     return Inversion(
         servo=servo,
         linearisation=linear,
@@ -115,10 +108,8 @@ class _Solver:
 
     def solve(self, breaks: Array) -> None:
         """Solve on all `breaks` (N + 1,), s, at once, from rest as at the start."""
-        guess, is_near = (
-            _constant(self.problem.start.state[: len(self.problem.scale)]),
-            True,
-        )  # derivatives to the guess
+        guess = _constant(self.problem.start.state[: len(self.problem.scale)], breaks)
+        is_near = True  # derivatives to the guess
         for refinement in range(MOST_REFINEMENTS):
             collocated = collocate(self.problem, breaks, guess)
             self.iterations += collocated.iterations
@@ -134,10 +125,10 @@ class _Solver:
                 self.status = "interrupted"
                 break
             if collocated.converged:
-                breaks, guess, is_near = cut(breaks, unmet / self.most), _states(collocated.curve), False
+                breaks, guess, is_near = cut(breaks, unmet / self.most), collocated.curve, False
             elif not is_near:
                 times = breaks[:: -(-len(breaks) // MOST_PLACES)]
-                derivatives = linear_dynamics(self.servo, times, *guess(times))
+                derivatives = linear_dynamics(self.servo, times, *(guess(times, k) for k in range(3)))
                 self.problem, is_near = replace(self.problem, derivatives=derivatives), True
             else:
                 breaks = halved(breaks)
@@ -158,7 +149,7 @@ class _Solver:
             window = np.linspace(t, last, int(np.ceil((last - t) / width - 1e-6)) + 1)
             derivatives = _about(self.servo, along, t, y)
             self.problem = replace(self.problem, derivatives=derivatives, start=Boundary(np.eye(2 * n), y))
-            collocated = collocate(self.problem, window, _constant(y[:n]))
+            collocated = collocate(self.problem, window, _constant(y[:n], window))
             self.iterations += collocated.iterations
             unmet = float(self._unmet(collocated.curve).max()) if collocated.converged else np.inf
             wider = float(np.clip(0.9 * (self.most / max(unmet, TINY)) ** 0.25, 0.2, 4.0))
@@ -169,8 +160,7 @@ class _Solver:
                     self.curve = collocated.curve
                 else:
                     self.curve.extend(collocated.curve.c, collocated.curve.x[1:])
-                p, v, _ = _states(collocated.curve)(window[-1:])
-                y = np.concatenate([p[0], v[0]])
+                y = np.concatenate([self.curve(last), self.curve(last, 1)])
                 self.status = "completed" if t >= end else "interrupted"
                 if not self.progress(t):
                     break
@@ -181,22 +171,17 @@ class _Solver:
 
     def _unmet(self, curve: PPoly) -> Array:
         """Largest |r| between the collocation points of each interval (N,)."""
-        times = (curve.x[:-1, None] + np.diff(curve.x)[:, None] * PROBES).ravel()
-        r = np.abs(self.problem.residual(times, *_states(curve)(times))).max(axis=1)
+        times = between(curve.x, PROBES)
+        r = np.abs(self.problem.residual(times, *(curve(times, k) for k in range(3)))).max(axis=1)
         return np.nan_to_num(r, nan=np.inf).reshape(-1, len(PROBES)).max(axis=1)
 
 
-def _about(servo: Servo, along: Derivatives, t: float, y: Array) -> Derivatives:
+def _about(servo: Servo, along: Callable[[Array], Array], t: float, y: Array) -> Callable[[Array], Array]:
     """Those `along` the path, with what the state y (2n,) at time t changes of them."""
     now, (p, v) = np.array([t]), y.reshape(2, 1, -1)
     here = linear_dynamics(servo, now, p, v, 0 * p)
-    M, D, K = (x - known for x, known in zip((here.M, here.D, here.K), along(now), strict=True))
-
-    def derivatives(times: Array) -> tuple[Array, Array, Array]:
-        known = along(times)
-        return known[0] + M, known[1] + D, known[2] + K
-
-    return derivatives
+    changes = np.array([here.M, here.D, here.K]) - along(now)
+    return lambda times: along(times) + changes
 
 
 def _boundaries(servo: Servo, linear: Linearisation, first: float, last: float) -> tuple[Boundary, Boundary]:
@@ -205,7 +190,6 @@ def _boundaries(servo: Servo, linear: Linearisation, first: float, last: float) 
     A zero that passes through infinity takes a condition away, or brings one: p̈ of a fast motion loses its factor
     there, and a motion without it is smooth (what is left of it shows in `unmet`). The fastest motion then has one
     condition more or less: intervals far longer than it lets it neither grow nor decay.
-    Raises `SolveError` where zeros change sides otherwise.
     """
     enforced = [~linear.is_future[0], linear.is_future[-1].copy()]
     excess = int(sum(of.sum() for of in enforced)) - linear.zeros.shape[1]
@@ -218,9 +202,9 @@ def _boundaries(servo: Servo, linear: Linearisation, first: float, last: float) 
         )
     zeros = linear.zeros[[0, -1]]
     speeds = np.where([of if excess > 0 else ~of for of in enforced], np.abs(zeros), 0.0).max(axis=1)
-    rows = [int(of.sum()) for of in enforced]
-    rows[int(speeds.argmax())] -= excess
-    start, end = (_boundary(servo, t, zeros[k], enforced[k], rows[k]) for k, t in enumerate((first, last)))
+    counts = [int(of.sum()) for of in enforced]
+    counts[int(speeds.argmax())] -= excess
+    start, end = map(partial(_boundary, servo), (first, last), zeros, enforced, counts)
     return start, end
 
 
@@ -231,7 +215,7 @@ def _boundary(servo: Servo, t: float, s: ComplexArray, is_enforced: Booleans, co
     `count` of them, without some of the fastest that are enforced, or with some of the fastest others.
     """
     p, rest = equilibrium(servo, t), np.zeros((1, len(servo.scale)))
-    A = first_order(linear_dynamics(servo, np.array([t]), p[None], rest, rest), 0, servo.scale)
+    A = first_order(linear_dynamics(servo, np.array([t]), p[None], rest, rest), servo.scale)[0]
     others = [is_enforced]  # sets of zeros, each within the next one, up to one with at least `count`
     is_more = bool(is_enforced.sum() < count)
     while not min(x.sum() for x in others) <= count <= max(x.sum() for x in others):
@@ -269,14 +253,5 @@ def halved(breaks: Array, which: Booleans | slice = slice(None)) -> Array:
     return np.sort(np.concatenate([breaks, ((breaks[1:] + breaks[:-1]) / 2)[which]]))
 
 
-def _constant(p: Array) -> States:
-    def states(times: Array) -> tuple[Array, Array, Array]:
-        rest = np.zeros((len(times), len(p)))
-        return rest + p, rest, rest
-
-    return states
-
-
-def _states(curve: PPoly) -> States:
-    rate, acceleration = curve.derivative(1), curve.derivative(2)
-    return lambda times: (curve(times), rate(times), acceleration(times))
+def _constant(p: Array, breaks: Array) -> PPoly:
+    return scipy.interpolate.PPoly(p[None, None], breaks[[0, -1]])

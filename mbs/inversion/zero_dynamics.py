@@ -32,11 +32,11 @@ class LinearDynamics:
     D: Array
     K: Array
 
-    def __call__(self, times: Array) -> tuple[Array, Array, Array]:
-        """M, D, K at any times, straight lines between those that are known."""
+    def __call__(self, times: Array) -> Array:
+        """M, D, K (3, T, n, n) at any `times` (T,), s, straight lines between those that are known."""
         inside = times.clip(self.times[0], self.times[-1])
-        M, D, K = (scipy.interpolate.make_interp_spline(self.times, x, 1)(inside) for x in (self.M, self.D, self.K))
-        return M, D, K
+        known: Array = scipy.interpolate.make_interp_spline(self.times, [self.M, self.D, self.K], 1, axis=1)(inside)
+        return known
 
 
 def linear_dynamics(servo: Servo, times: Array, p: Array, v: Array, a: Array) -> LinearDynamics:
@@ -72,13 +72,13 @@ def cause_in_posture(servo: Servo) -> str:
     return shape_in_redundant_loops(servo.model, servo.near[0], MultibodySystem(servo.model).integrated.rows)
 
 
-def first_order(dynamics: LinearDynamics, k: int, scale: Array) -> Array:
-    """Matrix 𝒜 (2n, 2n), 1/s, of ẏ = 𝒜 y for y = (ω p, ṗ), at node k; `scale` ω (n,), 1/s."""
-    n = len(scale)
-    A = np.zeros((2 * n, 2 * n))
-    A[:n, n:] = np.diag(scale)
-    A[n:, :n] = -np.linalg.solve(dynamics.M[k], dynamics.K[k] / scale)
-    A[n:, n:] = -np.linalg.solve(dynamics.M[k], dynamics.D[k])
+def first_order(dynamics: LinearDynamics, scale: Array) -> Array:
+    """Matrices 𝒜 (N, 2n, 2n), 1/s, of ẏ = 𝒜 y for y = (ω p, ṗ); `scale` ω (n,), 1/s."""
+    N, n = len(dynamics.M), len(scale)
+    A = np.zeros((N, 2 * n, 2 * n))
+    A[:, :n, n:] = np.diag(scale)
+    A[:, n:, :n] = -np.linalg.solve(dynamics.M, dynamics.K / scale)
+    A[:, n:, n:] = -np.linalg.solve(dynamics.M, dynamics.D)
     return A
 
 
@@ -111,7 +111,7 @@ class Linearisation:
 
         Sizes of pairs ± s differ by round-off alone: sides do not.
         """
-        s = np.linalg.eigvals(np.array([first_order(self.dynamics, k, self.scale) for k in range(len(self.times))]))
+        s = np.linalg.eigvals(first_order(self.dynamics, self.scale))
         side: Array = is_unstable(s).astype(int) - is_unstable(-s)
         return np.take_along_axis(s, np.lexsort((s.imag, np.abs(s), side), axis=1), axis=1)
 
@@ -131,9 +131,8 @@ class Linearisation:
         light = np.take_along_axis(self.is_light, places, axis=1)
         growth = 0.5 * np.diff(self.times) @ (s.real[1:] + s.real[:-1])
         future = np.where(light.any(axis=0), growth > most, is_unstable(s[0]))
-        flags = np.where(jumps, is_unstable(s) & ~light, future)
-        later = np.zeros(s.shape, dtype=bool)
-        np.put_along_axis(later, places, flags, axis=1)
+        later = np.empty_like(light)
+        np.put_along_axis(later, places, np.where(jumps, is_unstable(s) & ~light, future), axis=1)
         apart = np.abs(self.zeros[:, :, None] - self.zeros[:, None].conj())
         is_parted = later != np.take_along_axis(later, apart.argmin(axis=2), axis=1)  # two real ones have met
         return np.where(is_parted, is_unstable(self.zeros) & ~self.is_light, later)
@@ -186,13 +185,11 @@ def linearise(servo: Servo, end: float, samples: int = SAMPLES) -> Linearisation
     times = np.linspace(0.0, end, samples)
     p = shape_along(servo, times)
     dynamics = linear_dynamics(servo, times, p, 0 * p, 0 * p)
-    matrices = np.concatenate([dynamics.M, dynamics.D, dynamics.K], axis=1)
-    _check(servo, times, np.isfinite(matrices).all(axis=(1, 2)))
+    _check(servo, times, np.isfinite([dynamics.M, dynamics.D, dynamics.K]).all(axis=(0, 2, 3)))
     return Linearisation(dynamics, p, servo.scale)
 
 
 def _check(servo: Servo, times: Array, is_met: Booleans) -> None:
-    """Raise `SolveError` for the first of the times (N,) at which there is no shape."""
     if not is_met.all():
         cause = cause_in_posture(servo) or "the links are too soft for their loads there; slow the path down"
         t = times[is_met.argmin()]

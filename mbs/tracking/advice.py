@@ -78,11 +78,11 @@ def bounds_of_zeros(asked: Transition, linear: Linearisation, around: tuple[floa
     inverted = invert(servo, linear, pre, post, INVERTED, lambda _: True)
     if inverted.status != "completed":
         raise SolveError(f"{servo.where}: torques without voltages have no bounded motion: {inverted.status}")
-    zeros, times, shares, reliefs = [], [], [], []
+    found = list[tuple[complex, float, float, float]]()
     for t, rest, sign in ((-around[0], asked.rest[0], 1.0), (end + around[1], asked.rest[1], -1.0)):
         n, still = len(rest), np.zeros((1, len(rest)))
         dynamics = linear_dynamics(servo, np.array([t]), rest[None], still, still)
-        s, left = np.linalg.eig(first_order(dynamics, 0, servo.scale).T)
+        s, left = np.linalg.eig(first_order(dynamics, servo.scale)[0].T)
         y = np.concatenate([servo.scale * (inverted.curve(t) - rest), inverted.curve(t, 1)])
         B = np.linalg.solve(dynamics.M[0], asked.Phi_V) * unit
         off = np.zeros((3, 1, len(rows_of_points(servo))))
@@ -90,15 +90,12 @@ def bounds_of_zeros(asked: Transition, linear: Linearisation, around: tuple[floa
         by_error = np.linalg.solve(dynamics.M[0], slopes[:, 0, :n])
         for k in np.flatnonzero((sign * s.real > LIGHT * np.abs(s)) & (s.imag >= 0)):
             reach = float(np.abs(left[n:, k] @ B).sum())
-            zeros.append(s[k])
-            times.append(t)
             relieved = np.abs(left[n:, k] @ np.tensordot(s[k] ** np.arange(3), by_error, 1)).sum()
             required = max(0.0, float(abs(left[:, k] @ y) * abs(s[k].real) - asked.allowed * relieved))
-            shares.append(required / reach if reach else np.inf)
-            reliefs.append(relieved / reach if reach else 0.0)
-    voltages, relief = np.array(shares) * float(unit.max()), np.array(reliefs) * float(unit.max())
-    order = np.argsort(-voltages)
-    return Bounds(np.array(zeros, dtype=complex)[order], np.array(times)[order], voltages[order], relief[order])
+            found.append((s[k], t, *((required / reach, relieved / reach) if reach else (np.inf, 0.0))))
+    found.sort(key=lambda one: -one[2])
+    zeros, times, shares, reliefs = np.array(found, dtype=complex).reshape(-1, 4).T
+    return Bounds(zeros, times.real, shares.real * float(unit.max()), reliefs.real * float(unit.max()))
 
 
 def _remedies(posed: Posed, intervals: int, share: float) -> Iterator[str]:
@@ -111,9 +108,8 @@ def _remedies(posed: Posed, intervals: int, share: float) -> Iterator[str]:
     servo, end, given = asked.driven, asked.driven.end, asked.tolerance or Tolerance(0.0)
 
     def share_of(asked: Transition, more: float = 0.0) -> float:
-        path_end = asked.driven.end
-        breaks = start_breaks(-pre - more, path_end, path_end + post + more, intervals // 2)
-        least = settled(asked, breaks, ROUGHLY)
+        end = asked.driven.end
+        least = settled(asked, start_breaks(-pre - more, end, end + post + more, intervals // 2), ROUGHLY)
         return least.share if least.converged and servo.goes_on() else np.nan
 
     def slowed(more: float) -> float:
@@ -162,11 +158,12 @@ def check_reach(posed: Posed, least: Tracked | None) -> None:
     What would do follows from how the bound of the zero falls: as e^{−s t}, as T^−m, linearly with a path tolerance.
     """
     asked, bounds, limit = posed.asked, posed.bounds, posed.asked.units.max()
-    shares = [] if bounds is None else (bounds.voltages / limit).tolist()
-    share = max([*shares, *([] if least is None else [least.surely])], default=0.0)
+    share = 0.0 if least is None else least.surely
+    if bounds is not None:
+        share = float((bounds.voltages / limit).max(initial=share))
     if not asked.is_limited or share <= OUT_OF_REACH:
         return
-    servo, rate = asked.driven, slowest(posed.linear.zeros[[0, -1]])
+    servo, rate = asked.driven, slowest(posed.linear)
     needed = f"at least {share:.3g} times the limits"
     if bounds is not None and len(bounds.voltages):
         rate = abs(float(bounds.zeros[0].real))
@@ -290,20 +287,20 @@ def price_of_tolerance(asked: Transition, least: Tracked) -> float | None:
     return None if least.share and prices * asked.allowed < SEEN else prices * float(asked.units.max())
 
 
-def slowest(zeros: ComplexArray) -> float:
-    """Size of the real part, 1/s, of the slowest of the `zeros` (…), 1/s; 0 without any but vibrations."""
-    sizes = np.abs(zeros.real)[np.abs(zeros.real) > LIGHT * np.abs(zeros)]
+def slowest(linear: Linearisation) -> float:
+    """Size of the real part, 1/s, of the slowest zero where the path begins or ends; 0 without any but vibrations."""
+    sizes = np.abs(linear.zeros.real[[0, -1]])[~linear.is_light[[0, -1]]]
     return float(sizes.min()) if sizes.size else 0.0
 
 
 def _path_orders(targets: Sequence[TimeFunction], end: float) -> tuple[float, float]:
     """Power of time with which a path leaves its start and reaches its `end` (s): 2 where its acceleration jumps."""
-    orders = []
-    for t, ahead in ((0.0, 1.0), (end, -1.0)):
-        near = t + ahead * NEAR_END * end * np.array([1.0, 2.0])
-        size = np.sqrt(sum(target.sample(near)[2] ** 2 for target in targets))
-        orders.append(2.0 + np.log2(size[1] / size[0]) if size[0] > 0 else np.inf)
-    return float(orders[0]), float(orders[1])
+
+    def order(t: float, step: float) -> float:
+        once, twice = np.sqrt(sum(target.sample(t + step * np.array([1.0, 2.0]))[2] ** 2 for target in targets))
+        return float(2.0 + np.log2(twice / once)) if once > 0 else np.inf
+
+    return order(0.0, NEAR_END * end), order(end, -NEAR_END * end)
 
 
 def _lower_order(servo: Servo) -> float:
@@ -313,13 +310,13 @@ def _lower_order(servo: Servo) -> float:
 
 def rough_ends(targets: Sequence[TimeFunction], end: float) -> Iterator[str]:
     """A warning for a path to its `end` (s) whose acceleration or jerk jumps where it begins or ends."""
-    names = {2: "acceleration", 3: "jerk"}
-    rough = [(where, round(order)) for where, order in zip(("begins", "ends"), _path_orders(targets, end), strict=True)
-             if np.isfinite(order) and round(order) in names]  # fmt: skip
-    for order in sorted({order for _, order in rough}):
-        where = " and ".join(f"where it {name}" for name, of in rough if of == order)
-        cost = "no voltage without jumps makes up for that" if order == 2 else "that takes several times the voltage"
-        yield (f"the path's {names[order]} jumps {where}: {cost}. Smoother ends: 35*s**4 - 84*s**5 + 70*s**6 - 20*s**7")
+    ends = dict(zip(("where it begins", "where it ends"), np.round(_path_orders(targets, end)), strict=True))
+    for order, name, cost in (
+        (2, "acceleration", "no voltage without jumps makes up for that"),
+        (3, "jerk", "that takes several times the voltage"),
+    ):
+        if where := " and ".join(end for end, of in ends.items() if of == order):
+            yield f"the path's {name} jumps {where}: {cost}. Smoother ends: 35*s**4 - 84*s**5 + 70*s**6 - 20*s**7"
 
 
 def check_ends_for_gears(servo: Servo) -> float:
@@ -358,13 +355,12 @@ def _far_patches(context: Context, linear: Linearisation) -> Iterator[str]:
 
     In the continuum the path must start flatter than exp(−t_ℓ/t), t_ℓ = ℓ² √(ρA/EI)/8 (`docs/theory.md`).
     """
-    zeros = linear.zeros[[0, -1]]
-    rate = float(zeros.real[zeros.real > LIGHT * np.abs(zeros)].min(initial=np.inf))
-    model = context.model if context.whole is None else context.whole.model
+    zeros = linear.zeros.real[[0, -1]]
+    rate = float(zeros[(zeros > 0) & ~linear.is_light[[0, -1]]].min(initial=np.inf))
+    model = (context.whole or context).model
     for name in dict.fromkeys(path.point for path in model.scene.trajectory if path.point is not None):
         body, _, point = name.partition(".")
-        of_link = context.patches.get(body)
-        if of_link is None or not np.isfinite(rate):
+        if (of_link := context.patches.get(body)) is None or not np.isfinite(rate):
             continue
         at = float(model.tree.nodes[model.tree.index[body]].body.points[point].position[0])
         length = float(np.maximum(at - of_link.edges[:, 1], 0.0).min())

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...common.arrays import Array, PPoly
 from ...common.libraries import scipy
-from ..inversion.collocation import gauss
+from ..inversion.collocation import between, gauss
 from ..inversion.stable_inversion import halved
 from ..model.model import Model
 from ..run.record import GearCurve
@@ -120,7 +120,7 @@ def behind_gears(asked: Transition, tracked: Tracked, step: float) -> Tracked:
         return by_joint
 
     def along(breaks: Array) -> tuple[Array, list[Array]]:
-        times = _nodes(breaks)
+        times = between(breaks, TEN.c)
         return times, [curve(times, k) for k in range(3)]
 
     times, states = along(breaks)
@@ -142,18 +142,17 @@ def smooth(asked: Transition, tracked: Tracked) -> Tracked:
     Its third derivative is zero there, in place of a condition at the breaks next to the ends: else δ̈ would jump, and
     its reaction on a link with a gear of its own, whose motor would need an impulse.
     """
-    breaks, elastic = tracked.voltage.x, asked.driven.scale**2
+    breaks = tracked.voltage.x
     still = [(order, np.zeros(len(asked.Phi_V))) for order in (1, 2, 3)]
     knots = np.concatenate([breaks[:1].repeat(5), breaks, breaks[-1:].repeat(5)])
     through = np.delete(breaks, [1, -2])
     spline = scipy.interpolate.make_interp_spline(through, tracked.curve(through), t=knots, k=5, bc_type=(still, still))
     curve = _on(spline, breaks)
-    times = _nodes(breaks)
-    p = curve(times)
-    wanted = tracked.voltage(times)
+    times = between(breaks, TEN.c)
+    p, wanted = curve(times), tracked.voltage(times)
     left = asked.driven.residuals(times, p, curve(times, 1), curve(times, 2)) - wanted @ asked.Phi_V.T
     more = left @ np.linalg.pinv(asked.Phi_V, rcond=REACHES).T  # least voltages, as far as patches reach modes
-    unmet = float(np.abs(left - more @ asked.Phi_V.T).max() / np.abs(elastic * p).max())
+    unmet = float(np.abs(left - more @ asked.Phi_V.T).max() / np.abs(asked.driven.scale**2 * p).max())
     return replace(tracked, curve=curve, voltage=_through(breaks, wanted + more), unmet=unmet)
 
 
@@ -173,7 +172,7 @@ def largest_shares(asked: Transition, tracked: Tracked) -> Shares:
     gears, count = asked.gears, len(asked.limits.torque)
     assert gears is not None
     breaks = np.unique(np.concatenate([of.twist.x for of in tracked.gears.values()]))
-    times = np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * MANY).ravel(), breaks[-1])
+    times = np.append(between(breaks, MANY), breaks[-1])
     (least, most), V, torques = asked.ranges["voltage"], tracked.voltage(times), np.zeros((len(times), count))
     if len(gears.joints) < count:
         torques[:] = asked.driven.forces(times, *(tracked.curve(times, k) for k in range(3)))[1][:, :count]
@@ -196,13 +195,8 @@ def torques_beyond(model: Model, shares: Shares) -> Iterator[str]:
         )
 
 
-def _nodes(breaks: Array) -> Array:
-    """Ten Gauss points of each interval, one after the other."""
-    return (breaks[:-1, None] + np.diff(breaks)[:, None] * TEN.c).ravel()
-
-
 def _through(breaks: Array, values: Array) -> PPoly:
-    """Polynomials through values (N · 10, k) at `_nodes`, without what is rounding: their derivatives are used."""
+    """Polynomials through values (N · 10, k) at points `TEN`, without what is rounding: their derivatives are used."""
     h, at_nodes = np.diff(breaks), values.reshape(len(breaks) - 1, len(TEN.c), -1)
     series = np.einsum("ij,Njk->Nik", TO_SERIES, at_nodes)
     series = np.where(np.abs(series) > ROUNDING * np.abs(values).max(axis=0, initial=1e-300), series, 0.0)
@@ -237,8 +231,7 @@ def _twist(transmitted: PPoly, stiffness: float, damping: float) -> PPoly:
         derivative = derivative.derivative()
         series[order:] += (-lag) ** order * derivative.c / stiffness
     steady, h = scipy.interpolate.PPoly(series, breaks), np.diff(breaks)
-    first = series[-1]
-    last = np.array([np.polyval(series[:, k], h[k]) for k in range(len(h))])
+    first, last = series[-1], np.polyval(series, h)
     none = GONE * float(np.abs(first).max())
     starts, sizes = list[Array](), list[Array]()
     decaying = float(transmitted.c[-1, 0] / stiffness - first[0])
@@ -251,9 +244,6 @@ def _twist(transmitted: PPoly, stiffness: float, damping: float) -> PPoly:
         sizes.append(np.where(np.abs(gone) > none, gone, 0.0))
         decaying = float(decaying * np.exp(-step / lag) + last[k] - (first[k + 1] if k + 1 < len(h) else last[k]))
     fine = _on(steady, np.append(np.concatenate(starts), breaks[-1]))
-    degree = max(len(fine.c), len(EXPONENTIAL))
-    coefficients = np.zeros((degree, fine.c.shape[1]))
-    coefficients[degree - len(fine.c) :] = fine.c
-    powers = EXPONENTIAL[::-1, None] / lag ** np.arange(len(EXPONENTIAL) - 1, -1, -1.0)[:, None]
-    coefficients[degree - len(EXPONENTIAL) :] += powers * np.concatenate(sizes)
-    return scipy.interpolate.PPoly(coefficients, fine.x)
+    powers = (EXPONENTIAL / lag ** np.arange(len(EXPONENTIAL)))[::-1, None] * np.concatenate(sizes)
+    powers[-len(fine.c) :] += fine.c  # of a lower degree, `TEN` points
+    return scipy.interpolate.PPoly(powers, fine.x)

@@ -60,10 +60,10 @@ class GearedServo(Servo):
 
     def slopes(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
         """Derivatives (N, n + motors + k, n) by p̈, ṗ and p."""
-        n, found = p.shape[1], [super().slopes(times, p, v, a)]
-        for servo, column in zip(self.without, self.gears.columns, strict=True):
-            M, D, K = (x[:, [n + column]] for x in servo.slopes(times, p, v, a))
-            found.append((M, D, K))
+        found = [super().slopes(times, p, v, a)]
+        for servo, column in zip(self.without, p.shape[1] + self.gears.columns, strict=True):
+            M, D, K = servo.slopes(times, p, v, a)
+            found.append((M[:, [column]], D[:, [column]], K[:, [column]]))
         M, D, K = (np.concatenate(parts, axis=1) for parts in zip(*found, strict=True))
         return M, D, K
 
@@ -72,12 +72,12 @@ class GearedServo(Servo):
 
         A rotor enters them by its spin-up ψ̈, of which its own motor takes N times as much.
         """
-        M, n, shares = super().slopes(times, p, v, a)[0], p.shape[1], list[Array]()
-        for servo, column in zip(self.without, self.gears.columns, strict=True):
+        M, shares = super().slopes(times, p, v, a)[0], list[Array]()
+        for servo, column in zip(self.without, p.shape[1] + self.gears.columns, strict=True):
             of_rotor = M - servo.slopes(times, p, v, a)[0]
-            own = of_rotor[:, n + column]
+            own = of_rotor[:, column]
             share = np.einsum("Tfn,Tn->Tf", of_rotor, own) / np.maximum((own**2).sum(axis=1), TINY)[:, None]
-            share[:, n + column] = 0.0
+            share[:, column] = 0.0
             shares.append(share)
         return np.stack(shares, axis=1)
 
@@ -135,7 +135,7 @@ def with_gears(servo: Servo) -> Servo:
 
 
 def _check_rotors(servo: GearedServo, ratios: Array) -> None:
-    """Raise `InputError` for a rotor on a body that its own motor turns, so that links would feel the gear.
+    """Refuse a rotor on a body that its own motor turns, so that links would feel the gear.
 
     A gear transmits τ − N J ψ̈ with the spin ψ̇ of its rotor. Without the rotor a motor takes as much less only where
     the body that carries the rotor does not turn along with it.

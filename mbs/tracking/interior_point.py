@@ -50,11 +50,6 @@ class Program:
         """All z_k (N, s + r) of x (N+1, s)."""
         return np.hstack([x[:-1], x[1:, : self.g.shape[1] - x.shape[1]]])
 
-    def objective(self, x: Array) -> float:
-        """The objective at x (N+1, s)."""
-        z = self.z(x)
-        return float((z * (0.5 * _times(self.H, z) + self.g)).sum())
-
 
 class Minimum(NamedTuple):
     """x (N+1, s), the multipliers (N, i) ≥ 0 of C z ≤ d, and whether the method converged.
@@ -160,8 +155,7 @@ def minimize(program: Program, gap: float = GAP, near: Minimum | None = None) ->
         if way.gap * way.count > HALFWAY * way.size():
             halfway = way.slack, way.z, way.unknown
     multipliers = np.where(way.slack < way.z, way.z, 0.0)  # of bounds that are reached
-    change = halfway[2].copy()
-    x = way.unknown[way.equations.x]
+    x, change = way.unknown[way.equations.x], halfway[2].copy()
     change[way.equations.x] -= x
     return Minimum(x, multipliers, way.is_at_end(), (*halfway[:2], change))
 
@@ -207,7 +201,8 @@ class _CentralPath:
 
     def size(self) -> float:
         """What gaps are small against."""
-        return 1 + abs(self.program.objective(self.unknown[self.equations.x]))
+        program, z = self.program, self.program.z(self.unknown[self.equations.x])
+        return 1 + abs(float((z * (0.5 * _times(program.H, z) + program.g)).sum()))
 
     def advance(self) -> bool:
         """One step of predictor and corrector; False where there is none."""

@@ -24,7 +24,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...common.arrays import Array
-from ..inversion.collocation import GAUSS
+from ..inversion.collocation import GAUSS, between
 from ..inversion.stable_inversion import PROBES, cut, halved
 from ..inversion.zero_dynamics import shape_along
 from .steps import TOLERANCE, Iterate, Steps
@@ -60,28 +60,23 @@ def track(
     if asked.tolerance is not None and near is None:  # exact tracking is a good start
         exact = track(replace(asked, tolerance=None), breaks, None, calm, within)
         near = exact if exact.converged else None
-    driven, h = asked.driven, np.diff(breaks)
-    times = breaks[:-1, None] + h[:, None] * GAUSS.c
-    N, s, n, m = *times.shape, *asked.Phi_V.shape
-    flat = times.ravel()
-    p_s = shape_along(driven, np.concatenate([breaks, flat]))
-    p, v, u = p_s[: N + 1].copy(), np.zeros((N + 1, n)), np.zeros((N + 1, m * (asked.order + 1)))
-    K, sag_at = np.zeros((N, s, n)), p_s[N + 1 :]
-    tau_qs = driven.quasi_static(flat, sag_at).reshape(N, s, -1)
-    size = max(float(np.abs(driven.scale * p_s).max()), 1e-300)
-    if near is not None:
-        p, v = near.curve(breaks), near.curve(breaks, 1)
-        u = np.hstack([near.voltage(breaks, order) for order in (asked.order, *range(asked.order))])
-        K = near.curve(flat, 2).reshape(K.shape)
-    steps = Steps(asked, breaks, tau_qs, size)
+    driven, times = asked.driven, between(breaks, GAUSS.c)
+    p_s, points, (n, m) = shape_along(driven, np.concatenate([breaks, times])), len(breaks), asked.Phi_V.shape
+    K, e = np.zeros((points - 1, len(GAUSS.c), n)), np.zeros((points, 3 * asked.errors))
+    tau_qs = driven.quasi_static(times, p_s[points:]).reshape(*K.shape[:2], -1)
+    steps = Steps(asked, breaks, tau_qs, max(float(np.abs(driven.scale * p_s).max()), 1e-300))
     steps.tolerance = within if calm is None else max(within, WHILE_SETTLING)
-    e = np.zeros((N + 1, 3 * asked.errors))
-    if near is not None and near.error is not None:
-        e = np.hstack([near.error(breaks, order) for order in (2, 0, 1)])
-    start = Iterate(p, v, K, u, e, near.share if near is not None and steps.has_share else 1.0)
-    is_like = near is not None and near.objective == asked.objective and (near.error is None) == (asked.errors == 0)
-    if near is not None and is_like and np.array_equal(near.voltage.x, breaks):
-        start = replace(start, moved=near.step, found=near.found)
+    if near is None:
+        start = Iterate(p_s[:points], np.zeros((points, n)), K, np.zeros((points, m * (asked.order + 1))), e, 1.0)
+    else:
+        V = np.hstack([near.voltage(breaks, order) for order in (asked.order, *range(asked.order))])
+        K, share = near.curve(times, 2).reshape(K.shape), near.share if steps.has_share else 1.0
+        if near.error is not None:
+            e = np.hstack([near.error(breaks, order) for order in (2, 0, 1)])
+        start = Iterate(near.curve(breaks), near.curve(breaks, 1), K, V, e, share)
+        is_like = near.objective == asked.objective and (near.error is None) == (asked.errors == 0)
+        if is_like and np.array_equal(near.voltage.x, breaks):
+            start = replace(start, moved=near.step, found=near.found)
     if calm is not None:
         middle = 0.5 * (breaks[1:] + breaks[:-1])
         away = asked.rate * np.minimum(middle - breaks[0], breaks[-1] - middle)
@@ -158,13 +153,13 @@ def refined(asked: Transition, breaks: Array, tolerance: float, near: Tracked) -
 def _left_over(asked: Transition, tracked: Tracked, tolerance: float) -> tuple[float, Array]:
     """`Tracked.unmet`, and by interval (N,) that, or torques beyond their limits, as multiples of the tolerance."""
     breaks = tracked.voltage.x
-    times = (breaks[:-1, None] + np.diff(breaks)[:, None] * PROBES).ravel()
+    times = between(breaks, PROBES)
     motion, driven = [tracked.curve(times, k) for k in range(3)], asked.driven
     if tracked.error is not None:
         driven = displaced_at(driven, times, np.array([tracked.error(times, order) for order in range(3)]))
     r, tau = driven.forces(times, *motion)
-    r = r - tracked.voltage(times) @ asked.Phi_V.T
-    unmet = np.abs(r).max(axis=1) / float(np.abs(asked.driven.scale**2 * motion[0]).max())
+    largest = float(np.abs(asked.driven.scale**2 * motion[0]).max())
+    unmet = np.abs(r - tracked.voltage(times) @ asked.Phi_V.T).max(axis=1) / largest
     beyond = 2 * (np.abs(tau[:, : len(asked.limits.torque)]) / asked.limits.torque - 1.0).max(axis=1, initial=0.0)
     return float(unmet.max()), np.maximum(unmet, beyond).reshape(len(breaks) - 1, -1).max(axis=1) / tolerance
 

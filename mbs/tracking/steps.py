@@ -9,7 +9,7 @@ import numpy as np
 from ...common.arrays import Array, Indices, PPoly
 from ...common.libraries import scipy
 from ...common.structs import struct
-from ..inversion.collocation import GAUSS, Elimination, piecewise, stage_states
+from ..inversion.collocation import GAUSS, Elimination, between, piecewise, stage_states
 from .interior_point import GAP, Minimum, Program, minimize
 from .transition import RATE, Tracked, Transition, displaced_at, forces_off_path
 
@@ -18,13 +18,11 @@ TOLERANCE = 1e-8  # of the last Newton step, relative to the peak of its quantit
 POWERS = np.arange(2, len(GAUSS.c))
 CURVATURE = (GAUSS.c[:, None] ** (POWERS - 2) * POWERS * (POWERS - 1)) @ GAUSS.to_powers[2:]
 # Bernstein's coefficients (5, 4) on [0, 1] of a polynomial's integral, by its values at the Gauss points
-BERNSTEIN = np.einsum(
-    "ik,kj->ij", [[comb(i, k) / (k * comb(4, k)) for k in range(1, 5)] for i in range(5)], GAUSS.to_powers
-)
+BERNSTEIN = np.array([[comb(i, k) / (k * comb(4, k)) for k in range(1, 5)] for i in range(5)]) @ GAUSS.to_powers
 FIFTHS, THIRDS = np.linspace(0.0, 1.0, 5), np.linspace(0.0, 1.0, 4)
 # Bernstein's coefficients of polynomials by their values there
 OF_FIFTHS, OF_THIRDS = (
-    np.linalg.inv(np.array([[comb(m, k) * x**k * (1 - x) ** (m - k) for k in range(m + 1)] for x in at]))
+    np.linalg.inv([[comb(m, k) * x**k * (1 - x) ** (m - k) for k in range(m + 1)] for x in at])
     for m, at in ((4, FIFTHS), (3, THIRDS))
 )
 # of a cubic on both halves of an interval, without the last one, which is the first of the next half
@@ -51,23 +49,17 @@ class Curves:
         """V(t) by `u` (N + 1, count (order + 1)) at breaks: the linear derivative, then V and the lower ones."""
         linear, *lower = np.split(u, self.order + 1, axis=1)
         slope = np.diff(linear, axis=0) / (factorial(self.order + 1) * np.diff(self.breaks)[:, None])
-        derivatives = [*lower, linear]
-        powers = [derivatives[k][:-1] / factorial(k) for k in range(self.order, -1, -1)]
-        return scipy.interpolate.PPoly(np.array([slope, *powers]), self.breaks)
+        powers = [of[:-1] / factorial(k) for k, of in enumerate([*lower, linear])]
+        return scipy.interpolate.PPoly(np.array([slope, *powers[::-1]]), self.breaks)
 
     def _parts(self, xi: Array, derivative: int) -> Array:
         """A derivative of V at shares ξ (S,) of intervals, (N, S, order + 2), by what it follows from."""
-        h, x, times = np.diff(self.breaks)[:, None], xi[None], self.order - derivative  # times it is integrated
-        if times < 0:
-            last = np.ones_like(x) / h
-            first = -last
-        else:
-            last = h**times * x ** (times + 1) / factorial(times + 1)
-            first = h**times * (x**times / factorial(times) - x ** (times + 1) / factorial(times + 1))
-        one, by = np.ones_like(h * x), [first, last]
-        for k in range(-derivative, self.order - derivative):
-            by.append((h * x) ** k / factorial(k) if k >= 0 else 0.0 * one)
-        return np.stack([one * of for of in by], axis=2)
+        h, times = np.diff(self.breaks)[:, None], self.order - derivative  # times it is integrated
+        *lower, constant = (
+            (h * xi) ** k / factorial(k) if k >= 0 else 0.0 * h * xi for k in range(-derivative, times + 1)
+        )
+        last = h**times * xi ** (times + 1) / factorial(times + 1)
+        return np.stack([constant - last, last, *lower], axis=2)
 
     def by_z(self, xi: Array, derivative: int = 0) -> Array:
         """A derivative at shares ξ (S,) of intervals by z: (N, S, count, width)."""
@@ -142,7 +134,7 @@ class Steps:
     effort: tuple[Array, Array, float]  # H, g, and the constant that the program leaves out
     unique, damping = UNIQUE, 0.0
     of_voltages: float | Array = 1.0  # (N,) times the share of the effort
-    rows: dict[str, tuple[slice, Array, Indices]]  # of inequalities, their limits (i,), and whose they are (i,)
+    rows: list[tuple[str, Array, Indices]]  # of inequalities: their kind, limits (i,), and whose they are (i,)
 
     def __init__(self, asked: Transition, breaks: Array, tau_qs: Array, size: float) -> None:
         self.asked, self.breaks, self.h, self.tau_qs, self.size = asked, breaks, np.diff(breaks), tau_qs, size
@@ -156,8 +148,8 @@ class Steps:
         self.voltages = Curves(breaks, asked.order, self.m, places, self.width + self.m + k)
         places = np.array([self.m, self.width + self.m, self.y.stop + lower, self.y.stop + lower + k])
         self.errors = Curves(breaks, 2, k, places, self.width + self.m + k)
-        self.sigma, pace, each = 1.0, asked.weights.rate or RATE, np.ones(k)  # below: sizes that divide unknowns
-        volts, error = np.full(self.m, asked.weights.voltage), asked.allowed * each
+        self.sigma, pace = 1.0, asked.weights.rate or RATE  # below: sizes that divide unknowns
+        volts, error = np.full(self.m, asked.weights.voltage), np.full(k, asked.allowed)
         sizes = [size / asked.driven.scale, np.full(self.n, size)]
         sizes += [volts / pace**order for order in range(asked.order)]
         controls = [volts / pace**asked.order]
@@ -189,9 +181,8 @@ class Steps:
                 reached.append(np.einsum("Nmz,Nz->Nm", ends[-1], z))
         offset = np.concatenate(reached, axis=1) - x[1:, self.states]
         tau, tau_z = self._torques(forces[:, :, n:], [of[:, :, n:] for of in slopes], moved, (starts, K_z))
-        tau_z = tau_z + by_z[:, :, n:]
         charges = self._charges(now.v, now.K + moved, (starts[1], K_z))
-        of_motors = self._at_motors(tau), self._at_motors(tau_z)
+        of_motors = self._at_motors(tau), self._at_motors(tau_z + by_z[:, :, n:])
         self.program = self._program(np.concatenate(ends, axis=1), offset, *of_motors, x, charges)
         least = minimize(self.program, self.gap, now.found)
         change = least.x * self.unit
@@ -222,21 +213,19 @@ class Steps:
 
         Their derivatives by p̈, ṗ and p, (N, s, n + motors, n), and by `z` without these, (N, s, n + motors, …).
         """
-        N, s, n = states[0].shape
-        times = (self.breaks[:-1, None] + self.h[:, None] * GAUSS.c).ravel()
+        (N, s, n), times = states[0].shape, between(self.breaks, GAUSS.c)
         at, driven = [of.reshape(-1, n) for of in states], self.asked.driven
-        by_error: Array | float = 0.0
+        supplied = self.asked.Phi_V @ self.voltages.by_z(GAUSS.c)
         if self.errors.count:
             e_z = np.array([self.errors.by_z(GAUSS.c, order) for order in range(3)])
             off = np.einsum("oNskz,Nz->oNsk", e_z, z).reshape(3, len(times), -1)
             now, slopes = forces_off_path(driven, times, at, off)
-            by_error = (slopes.reshape(3, N, s, -1, self.errors.count) @ e_z).sum(axis=0)
+            by_z = (slopes.reshape(3, N, s, -1, self.errors.count) @ e_z).sum(axis=0)
             driven = displaced_at(driven, times, off)
         else:
             now = np.hstack(driven.forces(times, *at))
+            by_z = np.zeros((N, s, now.shape[1], len(self.unit_z)))
         forces = now.reshape(N, s, -1)
-        by_z = np.zeros((*forces.shape, len(self.unit_z))) + by_error
-        supplied = self.asked.Phi_V @ self.voltages.by_z(GAUSS.c)
         by_z[:, :, :n] -= supplied
         forces[:, :, :n] -= np.einsum("Nsnz,Nz->Nsn", supplied, z, optimize=True)
         return forces, [of.reshape(N, s, -1, n) for of in driven.slopes(times, *at)], by_z
@@ -245,11 +234,9 @@ class Steps:
         """Torques of motors (N, s, motors, …) at stages, or slopes, by those with rigid gears and transmitted ones."""
         if (gears := self.asked.gears) is None:
             return values
-        motors = values.shape[2] - len(gears.joints)
-        h = self.h.reshape(-1, *(1 for _ in values.shape[1:]))
-        second = np.einsum("ij,Nj...->Ni...", CURVATURE, values[:, :, motors:]) / h**2
+        motors, share = values.shape[2] - len(gears.joints), np.outer(self.h**-2, gears.inertia / gears.stiffness)
         of_motors = values[:, :, :motors].copy()
-        of_motors[:, :, gears.columns] += (second.swapaxes(2, -1) * (gears.inertia / gears.stiffness)).swapaxes(2, -1)
+        of_motors[:, :, gears.columns] += np.einsum("Nk,ij,Njk...->Nik...", share, CURVATURE, values[:, :, motors:])
         return of_motors
 
     def _torques(self, tau: Array, slopes: list[Array], moved: Array, by_z: tuple[Array, Array]) -> tuple[Array, Array]:
@@ -355,37 +342,32 @@ class Steps:
 
         `values` (N, rows, …) with their derivatives by z.
         """
-        limits, ranges, rows, most = self.asked.limits, self.asked.ranges, [], []
-        of_patches = limits.patches
-        known = {"voltage": of_patches.range, "slew": of_patches.slew, "current": of_patches.current}
-        known |= {kind: ranges[kind] for kind in ("error", "curving") if kind in ranges}
-        self.rows, count = {}, 0
+        limits, ranges, self.rows, rows, most = self.asked.limits, self.asked.ranges, [], [], []
+        of = limits.patches
+        known = ranges | {"voltage": of.range, "slew": of.slew, "current": of.current, "torque": limits.torque}
         for name, (now, by_z) in values.items():
             kind = "voltage" if name == "end" else name.removesuffix(" end")
             is_shared = self.asked.objective == f"least-{kind}"
-            finite = np.isfinite(np.atleast_2d(known.get(kind, limits.torque))).any(axis=0)
+            finite = np.isfinite(np.atleast_2d(known[kind])).any(axis=0)
             bounded = np.arange(now.shape[2]) if is_shared else np.flatnonzero(finite)
             for limit in ranges[kind][:, bounded]:
-                of = by_z[:, :, bounded] / limit[:, None]
-                acts = of.any(axis=3)
-                share = self.sigma if is_shared else 1.0
+                slopes = by_z[:, :, bounded] / limit[:, None]
+                acts = slopes.any(axis=3)
                 if is_shared:
-                    of[..., self.width - 1] = -1.0 * acts
-                rows.append(of.reshape(len(of), -1, of.shape[3]))
-                most.append(np.where(acts, share - now[:, :, bounded] / limit, 1.0).reshape(len(of), -1))
-                repeated = np.tile(bounded, now.shape[1])
-                part = slice(count, count + len(repeated))
-                self.rows[f"{name} {len(self.rows)}"] = part, np.tile(np.abs(limit), now.shape[1]), repeated
-                count = part.stop
+                    slopes[..., self.width - 1] = -1.0 * acts
+                N, share = len(slopes), self.sigma if is_shared else 1.0
+                rows.append(slopes.reshape(N, -1, slopes.shape[3]))
+                most.append(np.where(acts, share - now[:, :, bounded] / limit, 1.0).reshape(N, -1))
+                self.rows.append((kind, np.tile(np.abs(limit), now.shape[1]), np.tile(bounded, now.shape[1])))
         return np.concatenate(rows, axis=1), np.concatenate(most, axis=1)
 
     def prices(self, found: Minimum) -> dict[str, Array]:
         """`Tracked.prices`, by the multipliers of the last program, whose rows are shares of limits."""
-        prices = {name: np.zeros(range.shape[1]) for name, range in self.asked.ranges.items()}
-        for name, (part, limit, owners) in self.rows.items():
-            kind = name.split()[0].replace("end", "voltage")
+        prices = {kind: np.zeros(range.shape[1]) for kind, range in self.asked.ranges.items()}
+        parts = np.split(found.multipliers.sum(axis=0), np.cumsum([len(limit) for _, limit, _ in self.rows[:-1]]))
+        for (kind, limit, owners), multipliers in zip(self.rows, parts, strict=True):
             own = self.sigma if self.asked.objective == f"least-{kind}" else 1.0
-            np.add.at(prices[kind], owners, own * found.multipliers[:, part].sum(axis=0) / limit)
+            np.add.at(prices[kind], owners, own * multipliers / limit)
         return prices
 
     def cost(self, found: Minimum) -> float:

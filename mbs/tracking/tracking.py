@@ -50,6 +50,7 @@ from .problem import refined, settled, start_breaks
 from .transition import (
     RATE,
     RATE_BEHIND_GEARS,
+    TIME,
     Limits,
     Objective,
     Tolerance,
@@ -151,9 +152,11 @@ class Tracking(TimedAnalysis):
             if objective == "least-voltage":  # without the effort's share
                 smoothed = 1.0 - least.surely / tracked.share if tracked.gears else 0.0
                 least = replace(tracked, doubt=max(least.doubt, smoothed))
-            texts = list(warnings_of(context, posed, self.intervals, least))
-            shares = largest_shares(posed.asked, tracked) if tracked.gears else None
-            texts += () if shares is None else torques_beyond(model, shares)
+            texts, peaks = list(warnings_of(context, posed, self.intervals, least)), np.zeros(0)
+            if tracked.gears:
+                shares = largest_shares(posed.asked, tracked)
+                texts += torques_beyond(model, shares)
+                peaks = shares.peak_times
             if tracked.unmet > self.tolerance:
                 texts.append(
                     f"between Gauss points modal forces up to {tracked.unmet:.2g} of the largest elastic one are left"
@@ -172,7 +175,6 @@ class Tracking(TimedAnalysis):
         run = at(times)
         around = _with_torques_alone(context, run, around)
         statistics = replace(run.statistics, wall_seconds=time.perf_counter() - began, warnings=tuple(texts))
-        peaks = () if shares is None else shares.peak_times
         return replace(run, details=around, statistics=statistics).with_look(lambda times: at(np.union1d(times, peaks)))
 
 
@@ -192,7 +194,7 @@ class TrackedPath(AroundPath):
     path_tolerance: float | None  # m, by which coordinates of points may be off their path
     tolerance_price: float | None  # V/m, by how much less the least voltage is for a larger path tolerance
     # m or rad, how far off the path the same torques alone are at most; NaN where not found
-    without_patches: float = float("nan")
+    without_patches: float = np.nan
     is_needed: bool = True  # whether that is more than the tolerance times the path's way
 
 
@@ -200,12 +202,12 @@ def least_voltage(model: Model, patches: Mapping[str, PatchedLink], analysis: Tr
     """Least voltage, V, and its uncertainty (see `TrackedPath`) for another model of the robot; NaN if not found."""
     posed = _pose(model, patches, analysis, lambda: True)
     least = settled(posed.asked, posed.coarse)
-    voltage = least.share * float(posed.asked.units.max()) if least.converged else float("nan")
+    voltage = least.share * float(posed.asked.units.max()) if least.converged else np.nan
     return voltage, least.doubt * voltage
 
 
 def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, progress: Callable[[], bool]) -> Posed:
-    """The problem of a path: its robot, limits, ends, and the first breaks. Raises as `Tracking.run`, and `Stopped`."""
+    """The problem of a path: its robot, limits, ends, and the first breaks."""
     place, end = where(model.scene.path, analysis), analysis.end
     servo = with_gears(make_servo(model, end, place, progress, analysis.kind))
     check_rest(servo, analysis, (0.0, end))
@@ -216,9 +218,8 @@ def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, 
     if not np.any(Phi_V):
         raise InputError(f'{place}: expected patches on flexible links for kind = "tracking"', "none that bend one")
     linear = linearise(servo, end)
-    is_free = gears is not None and check_ends_for_gears(servo) < SNAP
-    pre, post = (None if value == "auto" else value for value in (analysis.pre_actuation, analysis.post_actuation))
-    around = durations(linear, (pre, post), analysis.output_step)
+    given = (None if value == "auto" else value for value in (analysis.pre_actuation, analysis.post_actuation))
+    around = durations(linear, given, analysis.output_step)
     first, last = -around[0], end + around[1]
     rest = equilibrium(servo, first - AT_REST * end), equilibrium(servo, last + AT_REST * end)
     asked = Transition(
@@ -228,8 +229,8 @@ def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, 
         _weights(servo, analysis, limits),
         rest,
         objective="least-voltage",
-        is_free=is_free,
-        rate=slowest(linear.zeros[[0, -1]]),
+        is_free=gears is not None and check_ends_for_gears(servo) < SNAP,
+        rate=slowest(linear),
         gears=gears,
         tolerance=_tolerance(servo, analysis),
     )
@@ -241,7 +242,6 @@ def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, 
 
 
 def _tolerance(servo: Servo, analysis: Tracking) -> Tolerance | None:
-    """How far points may be off their paths. Raises `InputError` where that makes no sense."""
     if (error := analysis.path_tolerance) is None:
         return None
     if isinstance(servo, GearedServo):
@@ -250,13 +250,12 @@ def _tolerance(servo: Servo, analysis: Tracking) -> Tolerance | None:
             "compliant gears with one: their motors would need torques that jump with its acceleration. Remove it, or"
             " stiffness and damping of joints",
         )
-    times = np.linspace(0.0, servo.end, len(servo.near_times))
     rows = [servo.model.rows[k] for k in rows_of_points(servo)]
-    way = max((float(np.ptp(row.target.sample(times)[0])) for row in rows if row.target), default=0.0)
+    way = max((float(np.ptp(row.target.sample(servo.near_times)[0])) for row in rows if row.target), default=0.0)
     if error >= way:
         found = f"{error:g} m for a path of {way:.3g} m" if rows else "trajectories of joints or angles only"
         raise InputError(f"{servo.where}: path_tolerance: expected a point whose path is longer", found)
-    return Tolerance(error) if analysis.tolerance_time is None else Tolerance(error, analysis.tolerance_time)
+    return Tolerance(error, analysis.tolerance_time or TIME)
 
 
 def _solve(context: Context, posed: Posed, analysis: Tracking, least: Tracked) -> tuple[Tracked, Objective]:
@@ -308,9 +307,8 @@ def _with_torques_alone(context: Context, run: Run, around: TrackedPath) -> Trac
 def _weights(servo: Servo, analysis: Tracking, limits: Limits) -> Weights:
     given, torque = analysis.weights, analysis.weights.moment
     if torque is None:
-        times = np.linspace(0.0, analysis.end, len(servo.near_times))
-        rest = np.zeros((len(times), len(servo.scale)))
-        tau = servo.quasi_static(times, rest)
+        straight = np.zeros((len(servo.near_times), len(servo.scale)))
+        tau = servo.quasi_static(servo.near_times, straight)
         torque = 0.5 * float(np.ptp(tau, axis=0).max()) or 1.0
     known = np.abs(limits.patches.range)[np.isfinite(limits.patches.range)]
     voltage = given.voltage or (float(known.max()) if known.size else VOLT)
@@ -328,7 +326,7 @@ def _around(context: Context, posed: Posed, tracked: Tracked, least: Tracked, ob
         post_actuation=float(tracked.curve.x[-1]) - posed.asked.driven.end,
         least_voltage=least.share * most,
         least_voltage_doubt=least.doubt * least.share * most,
-        least_share=least.share if posed.asked.is_limited else float("nan"),
+        least_share=least.share if posed.asked.is_limited else np.nan,
         objective=objective,
         cost=tracked.cost,
         held=posed.asked.driven.model,
@@ -337,9 +335,7 @@ def _around(context: Context, posed: Posed, tracked: Tracked, least: Tracked, ob
         path_tolerance=posed.asked.allowed or None,
         tolerance_price=price_of_tolerance(posed.asked, least),
         prices={
-            kind: context.model.by_motor(of)
-            if kind == "torque"
-            else {name: prices[0] for name, prices in _by_body(context, of[None]).items()}
+            kind: context.model.by_motor(of) if kind == "torque" else _by_body(context, of)
             for kind, of in tracked.prices.items()
         },
     )
@@ -347,18 +343,17 @@ def _around(context: Context, posed: Posed, tracked: Tracked, least: Tracked, ob
 
 def _outcome(analysis: Tracking, servo: Servo, tracked: Tracked, context: Context, times: Array) -> Run:
     curve, voltage = tracked.curve, tracked.voltage
-    how, steps = Choice("collocation", "interior-point method"), len(curve.x) - 1
-    statistics = Statistics("completed", how, steps=steps, evaluations=tracked.iterations)
+    how = Choice("collocation", "interior-point method")
+    statistics = Statistics("completed", how, steps=len(curve.x) - 1, evaluations=tracked.iterations)
     times = times.clip(voltage.x[0], voltage.x[-1])
     servo = servo if tracked.error is None else displaced_along(servo, tracked.error)
     run = outcome_along(curve, servo, analysis, context.model, statistics, times)
     assert run.prescribed is not None
     between = {body: type(voltage)(c, voltage.x) for body, c in _by_body(context, voltage.c).items()}
-    voltages = _by_body(context, voltage(times))
-    return replace(run, voltages=voltages, prescribed=run.prescribed._replace(voltages=between))
+    prescribed = run.prescribed._replace(voltages=between)
+    return replace(run, voltages=_by_body(context, voltage(times)), prescribed=prescribed)
 
 
 def _by_body(context: Context, V: Array) -> Mapping[str, Array]:
-    counts = [len(of_link.edges) for of_link in context.patches.values()]
-    parts = np.split(V, np.cumsum(counts)[:-1], axis=-1)
-    return dict(zip(context.patches, parts, strict=True))
+    ends = np.cumsum([len(of_link.edges) for of_link in context.patches.values()])
+    return dict(zip(context.patches, np.split(V, ends[:-1], axis=-1), strict=True))

@@ -166,8 +166,7 @@ def displaced_at(servo: Servo, times: Array, off: Array) -> Servo:
 
 def displaced_along(servo: Servo, error: PPoly) -> Servo:
     """The robot with points off their paths by `error` (k,), m, up to round-off: quintic Hermite pieces."""
-    start, end = error.x[[0, -1]]
-    times = np.union1d(error.x, np.linspace(start, end, PIECES + 1))
+    times = np.union1d(error.x, np.linspace(*error.x[[0, -1]], PIECES + 1))
     off = np.array([error(times, order) for order in range(3)])
     return _with_targets(servo, lambda target, k: through(times, target.sample(times) + off[:, :, k]))
 
