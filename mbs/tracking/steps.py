@@ -331,8 +331,9 @@ class Steps:
             by_end = self.voltages.by_z(np.ones(1))
             by_end[:-1] = 0.0
             limited["end"] = values(by_end)
-        if charges[0].shape[1] or self.asked.limits.patches.has_rates:
+        if self.asked.limits.patches.has_rates:
             limited["slew"] = values(self.voltages.by_z(within, 1))
+        if charges[0].shape[1]:
             rates = np.einsum("ij,Njmz->Nimz", OF_FIFTHS, self.voltages.by_z(FIFTHS, 1))
             limited["current"] = values(C[:, None] * rates, *charges)
         return limited

@@ -104,11 +104,13 @@ def test_least_current_and_what_is_less(solved):
         solved("current = 1e-7")
 
 
-def test_unequal_ranges(solved):
-    """Of each patch its own; the least voltage is a share of both limits."""
-    ranges = [[-300.0, 250.0], [-200.0, 200.0], [-250.0, 300.0], [-90.0, 200.0]]
-    with solved(f"range = {ranges}", limit="", alone=True) as results:
-        V = results["carried/pzt/arm/voltage"]
+def test_unequal_ranges_and_slew(solved):
+    """Of each patch its own; the least voltage is a share of both limits. Voltages are linear between breaks."""
+    ranges, slew = [[-300.0, 250.0], [-200.0, 200.0], [-250.0, 300.0], [-90.0, 200.0]], 3e4
+    with solved(f"range = {ranges}\nslew = {slew}", limit="", alone=True) as results:
+        V, time = results["carried/pzt/arm/voltage"], results["carried/time"]
+        rates = np.abs(np.diff(V, axis=0)) / np.diff(time)[:, None]
+        assert rates.max() == pytest.approx(slew, rel=1e-6)
         lowest, highest = np.array(ranges).T
         assert (lowest * (1.0 + 1e-9) <= V).all()
         assert (highest * (1.0 + 1e-9) >= V).all()
