@@ -76,7 +76,7 @@ class LinkTarget:
 
     def files(self, changes: dict[Key, float], output: Path | None) -> dict[Path, str]:
         """Return the text of the new link file, by path."""
-        return {_beside(self._path, output): with_values(read_text(self._path, "link file"), dict(changes))}
+        return {_beside(self._path, output): with_values(read_text(self._path, "link file"), changes)}
 
 
 def _fitted_name(path: Path, more: str = "") -> Path:
@@ -84,7 +84,7 @@ def _fitted_name(path: Path, more: str = "") -> Path:
 
 
 def _beside(path: Path, output: Path | None) -> Path:
-    """`output`, or the fitted file of `path`. Raises `InputError` for one elsewhere."""
+    """`output`, or the fitted file of `path`."""
     if output is not None and output.parent.resolve() != path.parent.resolve():
         raise InputError(f"{output}: output: expected a file next to {path}, to which its file names are relative")
     return output or _fitted_name(path)
@@ -205,11 +205,10 @@ def fit_measured(
 
     varied.check_new(replace=force)  # before any work is done
     measured_at = np.array([row.frequency for row in rows], dtype=np.float64)
-    spread = [row.uncertainty for row in rows if row.uncertainty is not None]
-    if spread and len(spread) < len(rows):
+    spread = np.array([row.uncertainty for row in rows if row.uncertainty is not None])
+    if 0 < len(spread) < len(rows):
         raise InputError(f"{table}: uncertainty: expected it of all frequencies or of none", len(spread))
-    uncertainty = np.array(spread) if spread else None
-    labels = [row.label for row in rows]
+    labels, uncertainty = [row.label for row in rows], spread if len(spread) else None
     fit = fit_frequencies(frequencies, varied.names, varied.start, labels, measured_at, uncertainty)
     return replace(fit, files=varied.write(fit.value))
 
@@ -239,8 +238,7 @@ class VariedKeys:
 
     def changes(self, values: Array) -> dict[Key, float]:
         """Return the values of all keys from those (n,) of the parameters."""
-        factors = values / self.start
-        pairs = zip(self._groups, factors, strict=True)
+        pairs = zip(self._groups, values / self.start, strict=True)
         return {key: float(self._starts[key] * c) for group, c in pairs for key in group}
 
     @contextmanager

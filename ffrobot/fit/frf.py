@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import zip_longest
+from itertools import compress, zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +23,7 @@ from ..common.arrays import Array, ComplexArray
 from ..common.errors import InputError, SolveError
 from ..common.files import AnyPath, check_new_file, write_atomically
 from ..common.libraries import scipy
+from ..common.structs import struct
 from ..common.toml_files import load_toml
 from ..common.validation import check_texts
 from ..map.pose_map import check_point
@@ -154,8 +155,8 @@ class PoseModel:
         Raises `InputError` for unknown points, `SolveError` without an equilibrium.
         """
         if self._initial is not None:
-            change = {"initial": self._initial, "trajectory": ()}
-            robot = unsolved(replace(robot, scene=robot.scene.model_copy(update=change)))
+            scene = robot.scene.model_copy(update={"initial": self._initial, "trajectory": ()})
+            robot = unsolved(replace(robot, scene=scene))
         q = undeformed_posture(robot.model).q
         first, *others = dict.fromkeys(row.point for row in self.pose.ends.directions)
         for point in (first, *others):
@@ -197,8 +198,8 @@ class PoseComparison:
     @property
     def frequency_error(self) -> Array:
         """Relative errors (k,) of the frequencies of the k peaks of the measured sum of magnitudes."""
-        pairs = ((self.pose.receptance, STANDS_OUT), (self.after, 0.1 * STANDS_OUT))
-        measured, fitted = (_peaks(self.pose.frequency, *pair) for pair in pairs)
+        measured = _peaks(self.pose.frequency, self.pose.receptance, STANDS_OUT)
+        fitted = _peaks(self.pose.frequency, self.after, 0.1 * STANDS_OUT)
         if not len(fitted):
             return np.zeros(0)
         return np.array([fitted[np.abs(fitted / f - 1.0).argmin()] / f - 1.0 for f in measured])
@@ -249,31 +250,28 @@ class ResponseFit(Parameters):
                     yield f"{where}: FRAC {frac:.3f}: the model lacks something there"
 
 
+@struct
 class _Residuals:
-    """Of FRFs in some poses, about θ = `center` (n,) exp x, with `equations` there and their `slopes` by θ."""
+    """Of FRFs in some poses, about θ = `center` (n,) exp x, with equations in `place` there and their `slopes` by θ."""
 
-    def __init__(
-        self,
-        poses: Sequence[MeasuredPose],
-        center: Array,
-        equations: Sequence[Array],
-        slopes: Sequence[Sequence[Array]],
-    ) -> None:
-        self._poses, self._center, self._equations, self.slopes = poses, center, equations, slopes
+    poses: Sequence[MeasuredPose]
+    center: Array
+    place: Sequence[Array]
+    slopes: Sequence[Sequence[Array]]
 
     def equations(self, x: Array) -> list[Array]:
         """The equations of all poses, linear in θ."""
-        change = self._center * np.expm1(x)
-        return [of + np.tensordot(change, by, axes=1) for of, by in zip(self._equations, self.slopes, strict=True)]
+        change = self.center * np.expm1(x)
+        return [of + np.tensordot(change, by, axes=1) for of, by in zip(self.place, self.slopes, strict=True)]
 
     def at(self, x: Array, smoothing: Sequence[Array] = ()) -> tuple[Array, Array]:
         """Residuals (m,) and their derivatives (m, n) by x; with a `smoothing` of each pose of magnitudes alone."""
         values, slopes = [], []
-        poses = zip(self._poses, self.equations(x), self.slopes, strict=True)
+        poses = zip(self.poses, self.equations(x), self.slopes, strict=True)
         for (pose, of, by), S in zip_longest(poses, smoothing):
             H, dH = receptance(of, pose, by)
             off = np.log(H / pose.receptance) / pose.deviation
-            by_x = (self._center * np.exp(x))[:, None, None] * dH / H / pose.deviation
+            by_x = (self.center * np.exp(x))[:, None, None] * dH / H / pose.deviation
             parts = (off.real, off.imag) if S is None else (S @ off.real,)
             parts_by_x = (by_x.real, by_x.imag) if S is None else (S @ np.ascontiguousarray(by_x.real),)
             values += [part.ravel() for part in parts]
@@ -283,7 +281,7 @@ class _Residuals:
     def least(self, width: float) -> Array:
         """The x (n,) of least squares, at most 1.5 away; of magnitudes smoothed over a `width` of ln f, if not 0."""
         smoothing = []  # (k, F) means over ln f with Gaussian weights, a quarter of their width apart
-        for pose in self._poses if width else ():
+        for pose in self.poses if width else ():
             places = np.log(pose.frequency)
             apart = (np.arange(places[0], places[-1] + width / 4, width / 4)[:, None] - places) / width
             weights = np.exp(-0.5 * apart**2)
@@ -295,7 +293,7 @@ class _Residuals:
 
         found = scipy.optimize.least_squares(
             lambda x: at(x.tobytes())[0],
-            np.zeros(len(self._center)),
+            np.zeros(len(self.center)),
             jac=lambda x: at(x.tobytes())[1],
             bounds=(-1.5, 1.5),
             x_scale="jac",
@@ -317,7 +315,7 @@ def differentiated(equations: Equations, values: Array, place: Sequence[Array]) 
 
 
 def _receptances(equations: Sequence[Array], poses: Sequence[MeasuredPose]) -> list[ComplexArray]:
-    """The FRFs (F, p) of all poses. Raises `InputError` for one of directions in which the robot does not move."""
+    """The FRFs (F, p) of all poses, all of directions in which the robot moves."""
     found = [receptance(of, pose)[0] for of, pose in zip(equations, poses, strict=True)]
     for pose, H in zip(poses, found, strict=True):
         for label, h, measured in zip(pose.labels, H.T, pose.receptance.T, strict=True):
@@ -340,14 +338,13 @@ def fit_receptances(
         InputError: all poses are for validation, or FRFs do not distinguish the parameters.
         SolveError: the iteration does not converge.
     """
-    used = [k for k, pose in enumerate(poses) if not pose.test.validation]
-    if not used:
+    used = [not pose.test.validation for pose in poses]
+    if not any(used):
         raise InputError("fit: expected a test that is not for validation", "none")
-    fitted = [poses[k] for k in used]
+    fitted = list(compress(poses, used))
 
     def of_used(values: Array) -> list[Array]:
-        found = equations(values)
-        return [found[k] for k in used]
+        return list(compress(equations(values), used))
 
     before = _receptances(equations(start), poses)
     theta, place, converged = start, of_used(start), False
@@ -395,8 +392,7 @@ def draw_responses(fit: ResponseFit, path: Path) -> Path:
         figure = Figure(figsize=(SIZE[0] * max(len(poses), 1), 1.4 * SIZE[1]), layout="constrained")
         axes = figure.subplots(2, len(poses), squeeze=False, sharex="col", height_ratios=(2, 1))
         for (above, below), one in zip(axes.T, poses, strict=True):
-            pose = one.pose
-            f = pose.frequency
+            pose, f = one.pose, one.pose.frequency
             order = sorted(range(len(pose.labels)), key=lambda k: pose.force[k] != pose.response[k])
             for k, color in zip(order[:3], COLORS, strict=False):
                 measured, fitted = pose.receptance[:, k], one.after[:, k]
@@ -404,11 +400,9 @@ def draw_responses(fit: ResponseFit, path: Path) -> Path:
                 above.semilogy(f, 1e3 * np.abs(fitted), color=color, label=pose.labels[k])
                 below.plot(f, np.degrees(np.angle(measured)), ".", color=color, markersize=2.0)
                 below.plot(f, np.degrees(np.angle(fitted)), color=color)
-            above.set_title(f"{one.pose.test.name}{' (validation)' * one.pose.test.validation}", loc="left")
+            above.set_title(f"{pose.test.name}{' (validation)' * pose.test.validation}", loc="left")
             above.set_ylabel("receptance (mm/N)")
             above.legend()
-            below.set_ylabel("phase (°)")
-            below.set_yticks([-180, -90, 0, 90, 180])
-            below.set_xlabel("frequency (Hz)")
+            below.set(xlabel="frequency (Hz)", ylabel="phase (°)", yticks=[-180, -90, 0, 90, 180])
         write_atomically(path, image_of(literal(figure), "png"), "picture", ours=True)
     return path

@@ -80,10 +80,8 @@ def _universal(path: Path) -> Iterator[Column]:
         force, response = (f"{node:g}/{_axis(path, axis)}" for node, axis in (at[:2], at[2:]))
         label = str(one["ordinate_axis_units_lab"]).strip().lower()
         is_si = label in ("", "none", *LABELS[ORDERS[kind]])
-        values = one["data"].astype(complex)
-        yield Column(
-            force, response, np.asarray(one["x"], float), values, coherence.get(at), order=ORDERS[kind], is_si=is_si
-        )
+        frequency, values = np.asarray(one["x"], float), one["data"].astype(complex)
+        yield Column(force, response, frequency, values, coherence.get(at), order=ORDERS[kind], is_si=is_si)
 
 
 def _axis(path: Path, code: float) -> str:
@@ -284,7 +282,7 @@ def _read(path: Path, test: ResponseTest) -> MeasuredPose:
 
 
 def _check(where: str, column: Column, inside: Booleans) -> None:
-    """Raise `InputError` for numbers that no FRF has."""
+    """Refuse numbers that no FRF has."""
     at, values = column.frequency[inside], column.values[inside]
     if not (np.diff(column.frequency) > 0.0).all():
         raise InputError(f"{where}: expected each frequency once, in rising order", "others")

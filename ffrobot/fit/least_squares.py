@@ -91,14 +91,8 @@ class Fit(Parameters):
 
         Student's t where the deviation is estimated from the remaining errors (JCGM 100:2008, G.3); NaN of none.
         """
-        quantile, freedom = 0.5 + 0.5 * probability, self.degrees_of_freedom
-        return float(
-            scipy.stats.norm.ppf(quantile)
-            if freedom is None
-            else scipy.stats.t.ppf(quantile, freedom)
-            if freedom
-            else np.nan
-        )
+        freedom = self.degrees_of_freedom
+        return float(scipy.stats.t.ppf(0.5 + 0.5 * probability, np.inf if freedom is None else freedom))
 
     @property
     def error(self) -> Array:
@@ -110,7 +104,7 @@ class Fit(Parameters):
         """√(χ²/(m − n)): remaining errors in terms of the uncertainties, about 1 of a right model; NaN without them."""
         spare = len(self.measured) - len(self.keys)
         if self.uncertainty is None or spare == 0:
-            return float("nan")
+            return np.nan
         return float(np.linalg.norm((self.after - self.measured) / self.uncertainty) / np.sqrt(spare))
 
     def comparison(self) -> tuple[Sequence[str], Iterator[Sequence[str]]]:
@@ -228,10 +222,8 @@ def uncertainty_of(J: Array, r: Array, *, known: bool) -> dict[str, Any]:
     NaN for m = n without `known` uncertainties of the measured values.
     """
     m, n = J.shape
-    if not known and m == n:
-        return {"relative_deviation": np.full(n, np.nan), "correlation": np.full((n, n), np.nan)}
-    variance = 1.0 if known else float(r @ r) / (m - n)
-    inverse = np.linalg.inv(J.T @ J)
+    inverse = np.linalg.inv(J.T @ J) if known or m > n else np.full((n, n), np.nan)
+    variance = 1.0 if known else r @ r / max(m - n, 1)
     deviation = np.sqrt(np.diag(inverse))
     correlation = inverse / np.outer(deviation, deviation)
     return {"relative_deviation": np.sqrt(variance) * deviation, "correlation": correlation}
