@@ -75,12 +75,11 @@ def candidates(robot: Robot, before: Diagnosis, limits: Limits, step: float, kin
     That is the one which settles first of those that keep the limits; where none settles, that which vibrates least.
     """
     search = _Search(robot, before, limits, step)
-    made = [search.simulated(*motion) for motion in search.motions()]
 
     def rank(one: Candidate) -> tuple[bool, bool, float, float]:
         return not one.name.startswith(kind), max(one.excess, one.torque) > 1.0, one.settled, one.residual
 
-    return sorted(made, key=rank)
+    return sorted((search.simulated(*motion) for motion in search.motions()), key=rank)
 
 
 Motion = tuple[str, Array, Array, Array | None]
@@ -89,7 +88,7 @@ Motion = tuple[str, Array, Array, Array | None]
 
 class _Search:
     def __init__(self, robot: Robot, before: Diagnosis, limits: Limits, step: float) -> None:
-        self.robot, self.limits, self.step, self.tolerance = robot, limits, step, robot.tolerance
+        self.robot, self.limits, self.step = robot, limits, step
         self.sag, (self.times, self.values) = before.ride.sag, evened(before.recording).dense(step / 2)
         low, high = limits.positions.T
         self.low, self.high = np.minimum(low, self.values.min(axis=0)), np.maximum(high, self.values.max(axis=0))
@@ -173,7 +172,7 @@ class _Search:
         residuals = list[float]()
         for motion in motions:
             residuals.append((left or self._left)(motion[1]))
-            if residuals[-1] <= SHARE * self.tolerance:
+            if residuals[-1] <= SHARE * self.robot.tolerance:
                 return motion
         return motions[int(np.argmin(residuals))]
 
@@ -197,7 +196,7 @@ class _Search:
 
 
 def _worst(modes: Sequence[Modes], path: Piecewise) -> float:
-    """Residual vibration (m, peak to peak) of the worst posture, driven along the path."""
+    """Residual vibration (m, peak to peak) of the worst posture."""
     driving = accelerations(path)
     return max((float(2 * np.abs(one.left(*driving).sum(axis=1)).sum()) for one in modes), default=0.0)
 

@@ -58,17 +58,15 @@ class Diagnosis:
         """Return the fault and its cause as text."""
         kinds = list(dict.fromkeys(fault.kind for fault in self.faults))
         causes = [kind for kind in kinds if kind.startswith(CAUSES)]
-        settling = self.ride.settling
         if not self.frequencies.size:
             return "nothing vibrates in the model: its links and gears are rigid. Gears with stiffness do"
-        if settling is None:
+        if self.ride.settling is None:
             return "the robot has no place of rest at the end of the motion: joints without motors are free"
         if self.residual <= robot.tolerance:
             what = f"{robot.point} vibrates by {1e3 * self.residual:.2g} mm at most"
             stream = f". Faults of the stream: {', '.join(kinds)}" if kinds else ", and the stream has no fault"
             return f"not vibration of the robot: {what}{stream}"
-        worst = int(self.shares.argmax())
-        share = 100 * self.shares[worst]
+        worst, share = int(self.shares.argmax()), 100 * self.shares.max()
         others = f", other joints take {share - 100:.0f} % away" if round(share) > 100 else ""
         frequency = self.frequencies[-1, int(self.by_mode.argmax())]
         why = f"faults of the stream ({', '.join(causes)})" if causes else "the motion, without a fault of the stream"

@@ -66,21 +66,21 @@ def _tables(smoothed: Smoothed) -> list[Table]:
 
 
 def _lines(smoothed: Smoothed) -> list[tuple[str, str]]:
-    before, joints = smoothed.before, len(smoothed.before.recording.joints)
-    words = [axis.words for axis in smoothed.robot.servo.axes]
-    each = [f"{joint}: {of}" for joint, of in zip(smoothed.robot.joints, words, strict=True)]
+    before, robot, recording = smoothed.before, smoothed.robot, smoothed.before.recording
+    joints, words = len(robot.joints), [axis.words for axis in robot.servo.axes]
+    each = [f"{joint}: {of}" for joint, of in zip(robot.joints, words, strict=True)]
     settling = "no place of rest"
     if of := before.ride.settling:
-        settling = Settled(smoothed.robot.point, before.residual, of.frequency, of.time_to, of.tolerance).in_words
+        settling = Settled(robot.point, before.residual, of.frequency, of.time_to, of.tolerance).in_words
     return [
-        ("motion", f"{len(before.recording.times)} set points of {joints} joint{'s' * (joints > 1)} over"
-         f" {before.recording.times[-1]:.4g} s, every {1e3 * before.recording.step:.3g} ms"),
+        ("motion", f"{len(recording.times)} set points of {joints} joint{'s' * (joints > 1)} over"
+         f" {recording.times[-1]:.4g} s, every {1e3 * recording.step:.3g} ms"),
         *(("servo", of) for of in (each if len(set(words)) > 1 else words[:1])),
         *(("frequency", f"{of.min():.3g} to {of.max():.3g} Hz along the motion") for of in before.frequencies.T),
-        *(("note", remark) for remark in before.recording.remarks),
+        *(("note", remark) for remark in recording.remarks),
         *(("fault", f"{fault.kind}: {fault.text}") for fault in before.faults),
         *([("settling", settling)] if before.frequencies.size else []),
-        *([] if smoothed.robot.servo.is_invertible else [("note", STUBBORN)]),
+        *([] if robot.servo.is_invertible else [("note", STUBBORN)]),
     ]  # fmt: skip
 
 
@@ -105,11 +105,12 @@ LEAST = 1e-3  # of the tolerance: what is drawn of distances
 
 def picture(smoothed: Smoothed, extension: str) -> bytes:
     """The file of the picture, "png" or "svg"."""
+    before, units = smoothed.before, smoothed.robot.units
     with style():
         figure = Figure(figsize=WIDE, layout="constrained")
         grid = figure.add_gridspec(2, 5)
-        _accelerations(figure.add_subplot(grid[0, :3]), smoothed.before, smoothed.robot.units("/s²"))
-        _spectrum(figure.add_subplot(grid[0, 3:]), smoothed.before, smoothed.robot.units("/s"))
+        _accelerations(figure.add_subplot(grid[0, :3]), before, units("/s²"))
+        _spectrum(figure.add_subplot(grid[0, 3:]), before, units("/s"))
         _distance(figure.add_subplot(grid[1, :]), smoothed)
         return image_of(literal(figure), extension)
 
@@ -118,8 +119,7 @@ def _accelerations(axes: Axes, of: Diagnosis, unit: str) -> None:
     times, values = difference_quotients(*difference_quotients(*of.recording.dense(of.recording.step)))
     for joint, column in zip(of.recording.joints, values.T, strict=True):
         axes.plot(times, column, label=joint)
-    axes.set_title(f"acceleration of set points ({unit})")
-    axes.set_xlabel("t (s)")
+    axes.set(title=f"acceleration of set points ({unit})", xlabel="t (s)")
     axes.legend(fontsize=7)
 
 
@@ -129,9 +129,7 @@ def _spectrum(axes: Axes, of: Diagnosis, unit: str) -> None:
         axes.axvspan(min(band.min(), grid[-1]), min(band.max(), grid[-1]), color=BAND)
     for values in each:
         axes.plot(grid, values)
-    axes.set_yscale("log")
-    axes.set_title(f"its spectrum ({unit}), natural frequencies")
-    axes.set_xlabel("frequency (Hz)")
+    axes.set(title=f"its spectrum ({unit}), natural frequencies", xlabel="frequency (Hz)", yscale="log")
 
 
 def _distance(axes: Axes, smoothed: Smoothed) -> None:
@@ -140,7 +138,6 @@ def _distance(axes: Axes, smoothed: Smoothed) -> None:
         (line,) = axes.plot(one.ride.times, 1e3 * np.maximum(one.ride.off, LEAST * tolerance), label=one.name)
         axes.axvline(one.times[-1], color=line.get_color(), linewidth=0.8, linestyle=":")
     axes.axhline(1e3 * tolerance, color="0.6", linewidth=0.8, linestyle="--", label="tolerance")
-    axes.set_yscale("log")
-    axes.set_title(f"distance of {smoothed.robot.point} from its final place (mm)")
-    axes.set_xlabel("t (s)")
+    title = f"distance of {smoothed.robot.point} from its final place (mm)"
+    axes.set(title=title, xlabel="t (s)", yscale="log")
     axes.legend()

@@ -92,7 +92,6 @@ def read_recording(path: Path, scene: Scene, *, is_in_degrees: bool = False) -> 
     if not is_in_degrees:
         _check_unit(path, joints, values)
     others = [name for k, name in enumerate(record.columns) if k not in columns]
-    left = (f"columns left out: {quoted(others)}",) if others else ()
     good = record.times > np.append(-np.inf, np.maximum.accumulate(record.times)[:-1])
     times, values = record.times[good], values[good]
     if len(times) < 4:
@@ -100,7 +99,7 @@ def read_recording(path: Path, scene: Scene, *, is_in_degrees: bool = False) -> 
     if np.ptp(values, axis=0).max() <= STILL:
         raise InputError(f"{path}: expected joints that move", "none")
     rates = None if record.rates is None else record.rates[good][:, columns] * scale
-    remarks = (*record.remarks, *left)
+    remarks = (*record.remarks, *([f"columns left out: {quoted(others)}"] if others else []))
     return without_rest(Recording(tuple(names), times - times[0], values, record.times - times[0], rates, remarks))
 
 
@@ -171,11 +170,12 @@ def faults_of_stamps(recording: Recording) -> Iterator[Fault]:
             f" t = {recording.times[k]:.4g} s: lines bridge them",
         )  # fmt: skip
     own = steps[~late] - usual * np.maximum(np.round(steps[~late] / usual), 1.0)  # rows may be left out
-    if recording.rates is None and np.sqrt(np.mean(own**2)) > UNEVEN * usual:
+    jitter = np.sqrt(np.mean(own**2))
+    if recording.rates is None and jitter > UNEVEN * usual:
         is_late = evened(recording) is not recording
         evenly = " Rows are smoother at even times: stamps are late, not the motion" if is_late else ""
         yield Fault(
-            "jitter", f"steps of {1e3 * usual:.4g} ms jitter by {1e3 * np.sqrt(np.mean(own**2)):.3g} ms (RMS), from"
+            "jitter", f"steps of {1e3 * usual:.4g} ms jitter by {1e3 * jitter:.3g} ms (RMS), from"
             f" {1e3 * steps.min():.3g} to {1e3 * steps[~late].max():.3g} ms.{evenly}",
         )  # fmt: skip
 
@@ -205,10 +205,8 @@ def faults_of_motion(recording: Recording, limits: Limits, torque: Array) -> Ite
         for bound, beyond in zip(limits.positions[k], (values[:, k].min(), values[:, k].max()), strict=True):
             if not limits.positions[k, 0] <= beyond <= limits.positions[k, 1]:
                 yield Fault("limit", f"{name}: position {beyond:.4g} beyond its limit of {bound:.4g}")
-    of_motion = zip(
-        ("speed", "acceleration", "jerk", "torque"), (*peaks(times, values), torque), limits.sizes, strict=True
-    )
-    for word, sizes, of in of_motion:
+    words, found = ("speed", "acceleration", "jerk", "torque"), (*peaks(times, values), torque)
+    for word, sizes, of in zip(words, found, limits.sizes, strict=True):
         for name, peak, limit in zip(motion.joints, sizes, of, strict=True):
             if peak > limit * (1 + KEPT):
                 yield Fault("limit", f"{name}: {word} of up to {peak:.4g}, beyond its limit of {limit:.4g}")
@@ -229,7 +227,7 @@ class Limits:
 def limits_of(scene: Scene, acceleration: float, jerk: float) -> Limits:
     """Return limits of joints with motors; `acceleration` and `jerk` are in rad/s² and rad/s³ (m/s², m/s³)."""
     joints = scene.motor_joints
-    sizes = [(motor.speed, acceleration, jerk, motor.moment) for motor in (joint.motor_limits[0] for joint in joints)]
+    sizes = [(motor.speed, acceleration, jerk, motor.moment) for joint in joints for motor in joint.motor_limits[:1]]
     positions = np.array([joint.position_limits[0] for joint in joints])
     return Limits(positions, np.transpose(sizes), tuple(joint.units[0] for joint in joints))
 
