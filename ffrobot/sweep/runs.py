@@ -5,7 +5,7 @@ import os
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -109,10 +109,10 @@ def perform(run: SweepRun) -> Row | None:
     if code in STOPPED:
         return None
     status = {0: "completed", 1: "failed", 2: "wrong input"}.get(code, "crashed")
-    row = Row(run.number, run.values, status, "" if code == 0 else _message(printed, run.folder, code))
+    message = "" if code == 0 else _message(printed, run.folder, code)
     quantities = _quantities(results, run) if results.exists() else {}
-    inputs = run.inputs | imported
-    return replace(row, quantities=quantities, inputs=inputs, imported=tuple(imported), wanted=run.wanted)
+    inputs, others = run.inputs | imported, tuple(imported)
+    return Row(run.number, run.values, status, message, quantities, inputs, imported=others, wanted=run.wanted)
 
 
 def finished_row(folder: Path) -> Row | None:
@@ -134,8 +134,8 @@ def _message(printed: str, folder: Path, code: int) -> str:
 
 def _quantities(path: Path, run: SweepRun) -> dict[str, float]:
     """How the analyses went; of whole results also the standard quantities, and those to collect."""
+    quantities: dict[str, float] = {}
     with Results(path) as results:
-        quantities: dict[str, float] = {}
         for analysis in results.analyses:
             about = results.attributes(analysis)
             quantities |= {f"{analysis} {key}": float(about[key]) for key in ("steps", "wall_seconds")}
@@ -193,7 +193,7 @@ def _reduce(results: Results, name: str, reduction: str) -> float:
     try:
         values = results.data(name)
     except InputError:
-        return float("nan")
+        return np.nan
     dataset, bracket, column = name.partition("[")
     key = {"max": "peak", "rms": "rms"}.get(reduction, "")
     known = np.atleast_1d(results.attributes(dataset).get(key, ()))  # of all times that the run looked at
@@ -201,11 +201,13 @@ def _reduce(results: Results, name: str, reduction: str) -> float:
         return float(known[int(column.rstrip("]"))])
     if len(known) and not bracket and (reduction == "max" or len(known) == 1):
         return float(known.max())
-    vector = is_vector(results, name, values)
-    history = np.linalg.norm(values, axis=1) if vector else values[:, 0]
     is_spectrum = name.rpartition("/")[2] in PER_MODE and not OF_MODES.isdisjoint(name.split("/"))
-    if values.shape[1] > 1 and not vector and (reduction == "max" or not is_spectrum):
+    if is_vector(results, name, values):
+        history = np.linalg.norm(values, axis=1)
+    elif values.shape[1] > 1 and (reduction == "max" or not is_spectrum):
         history = np.abs(values).max(axis=1)
+    else:
+        history = values[:, 0]
     time = results.time(dataset)
     time = time if len(time) == len(history) else np.arange(float(len(history)))  # of zeros, which have their own
     return float(REDUCTIONS[reduction](time, history))

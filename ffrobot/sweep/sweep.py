@@ -77,8 +77,7 @@ class Sweep:
                 changes = {".".join(key): value for key, value in self.changes(values).items()}
                 name = digest_of_content(changes)[:16]
             folder = self.folder.absolute() / "runs" / name
-            run = SweepRun(k, values, folder, self.collect, allow_python=self.allow_python, wanted=self.wanted)
-            runs.append(run)
+            runs.append(SweepRun(k, values, folder, self.collect, allow_python=self.allow_python, wanted=self.wanted))
         return runs
 
     def changes(self, values: Sequence[Value]) -> dict[Key, Value]:
@@ -125,7 +124,6 @@ def plan_sweep(
 def run_sweep(sweep: Sweep, batch: Batch, watcher: Watcher) -> list[Row]:
     """The rows of all runs, jobs of `batch`; failures are rows, too. The table in the folder grows with every run."""
     rows, waiting = _rows_and_runs(sweep)
-    before = len(sweep.earlier)
 
     def tabulate() -> None:
         known = [*sweep.earlier, *(rows[k] for k in sorted(rows))]
@@ -152,7 +150,7 @@ def run_sweep(sweep: Sweep, batch: Batch, watcher: Watcher) -> list[Row]:
                 )
             write_atomically(run.folder / ROW, json.dumps(asdict(row)).encode(), "row of the sweep", ours=True)
             rows[row.number] = row
-            watcher.advance(before + len(rows), before + len(sweep.points))
+            watcher.advance(len(sweep.earlier) + len(rows), len(sweep.earlier) + len(sweep.points))
             if (now := monotonic()) >= due:
                 tabulate()
                 due = now + (monotonic() - now) / TABLE_SHARE
@@ -167,12 +165,10 @@ def stale_rows(sweep: Sweep) -> str:
     stale: dict[str, None] = {}
     count = 0
     for run in sweep.runs:
-        row = finished_row(run.folder)
-        if row is None or not (what := row.changes(_files(sweep, run).inputs)):
-            continue
-        stale |= dict.fromkeys(what if row.inputs else [PROGRAM])
-        count += 1
-        (run.folder / ROW).unlink()
+        if (row := finished_row(run.folder)) and (what := row.changes(_files(sweep, run).inputs)):
+            stale |= dict.fromkeys(what if row.inputs else [PROGRAM])
+            count += 1
+            (run.folder / ROW).unlink()
     names = " and ".join(stale)
     return f"{names} {'have' if len(stale) > 1 else 'has'} changed since: {count} rows computed again" if stale else ""
 
@@ -182,9 +178,9 @@ def _rows_and_runs(sweep: Sweep) -> tuple[dict[int, Row], dict[int, SweepRun]]:
     rows, waiting = {}, {}
     for run in sweep.runs:
         files, row = _files(sweep, run), finished_row(run.folder)
-        is_read = sweep.growing and row is not None and row.status == "completed"
-        is_whole = row is not None and (not is_read or ((run.folder / RESULTS).exists() and row.has(sweep.wanted)))
-        if row is not None and is_whole and not row.changes(files.inputs):
+        is_read = sweep.growing and row and row.status == "completed"
+        is_whole = row and (not is_read or ((run.folder / RESULTS).exists() and row.has(sweep.wanted)))
+        if row and is_whole and not row.changes(files.inputs):
             rows[run.number] = replace(row, number=run.number, values=run.values)
         else:
             files.write(run.folder)
@@ -214,8 +210,7 @@ def check_point(sweep: Sweep, values: tuple[Value, ...]) -> None:
                     read_link(body.link)
         except InputError as error:
             message = str(error).replace(str(Path(folder) / SCENE), str(sweep.scene)).replace(folder + os.sep, "")
-            pairs = zip(sweep.variations, values, strict=True)
-            what = ", ".join(f"{variation.name} = {value}" for variation, value in pairs)
+            what = ", ".join(f"{name} = {value}" for name, value in zip(sweep.keys, values, strict=True))
             raise InputError(f"with {what}:\n{message}") from None
 
 
