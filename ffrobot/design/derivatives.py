@@ -133,8 +133,8 @@ def entries(base: Base, samples: Sequence[Sample]) -> tuple[tuple[Entry, ...], .
 
 def rough_keys(base: Base, samples: Sequence[Sample], *, smaller: bool) -> list[int]:
     """Return numbers of keys with errors above `AIM` whose best derivative has the smallest (or largest) step."""
-    rough, rows = set(), entries(base, samples)
-    for g, row in enumerate(rows):
+    rough = set()
+    for g, row in enumerate(entries(base, samples)):
         largest = max((_relative(one.derivative, base, g, k) for k, one in enumerate(row)), key=np.nan_to_num)
         for k, one in enumerate(row):
             sizes = sorted({abs(each.offset) for each in samples if each.k == k and each.responses}, reverse=True)
@@ -153,14 +153,14 @@ def _entry(base: Base, g: int, k: int, all_samples: Sequence[Sample]) -> Entry:
     by_coarse = derivative(offsets, np.array([nominal.coarse, *(one.coarse for one in beside)])).value
     unresolved = abs(by_coarse - slope.value) / RESOLVING if np.isfinite(by_coarse) else 0.0
     # Steps that are the same for all runs err alike: no difference of runs tells of that.
-    size = abs(base.readings[g].value) / (abs(base.point[k]) or 1.0)
+    size = abs(nominal.value) / (abs(base.point[k]) or 1.0)
     slope = slope._replace(error=slope.error + unresolved + base.repeats * max(abs(slope.value), size))
     method: Method = "repeated steps" if base.repeats else "differences"
     if not offsets.min() < 0.0 < offsets.max():
         method = "one-sided"
     if np.isnan(slope.value):
         method = "none"
-    notes = [*_notes(base, g, k, samples)]
+    notes = list(_notes(base, g, k, samples))
     for error, note in (
         (slope.error - unresolved, "not smooth, or noisy: half of the step yields another derivative"),
         (unresolved, "the peak lies between outputs that are too far apart: take a smaller output_step"),

@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
-from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from math import ceil
 from pathlib import Path
@@ -54,7 +53,7 @@ def changes_for(
         if record.name in needed and record.source is not None:
             needed.add(record.source)
     whole = run_files(path, {}, path.parent).scene["analysis"]
-    tables = deepcopy([table for table in whole if table["name"] in needed])
+    tables = [table for table in whole if table["name"] in needed]
     for table, record in zip(tables, (one for one in scene.analysis if one.name in needed), strict=True):
         table.pop("check", None)
         if tolerance is not None and not isinstance(record, Tracking):  # whose tolerance chooses a mesh
@@ -201,7 +200,7 @@ class Designs:
         allowed = (runs.path.absolute().parent, *allowed_python())
         variations = tuple(Variation((key,), ()) for key in keys)
         self._sweep = Sweep(
-            runs.path, variations, (), runs.folder, (), allow_python=allowed, fixed=fixed, own=own, growing=True
+            runs.path, variations, (), runs.folder, allow_python=allowed, fixed=fixed, own=own, growing=True
         )
         self._runs, self.most = runs, most
         self._designs: dict[Path, Design] = {}

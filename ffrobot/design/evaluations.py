@@ -17,7 +17,7 @@ theorem).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -153,7 +153,6 @@ class Slopes:
     kinks: tuple[str, ...] = ()
 
 
-@dataclass
 class Differentiation:
     """Gradients in one search; `tolerance` of its runs.
 
@@ -161,15 +160,9 @@ class Differentiation:
     out to be none. `curvature` (r, n) holds the second derivatives that the last central pairs gave, NaN before.
     """
 
-    evaluations: Evaluations
-    tolerance: float
-    repeats: bool = True
-    curvature: Array = field(init=False)
-
-    def __post_init__(self) -> None:
-        shape = len(self.evaluations.problem.responses), len(self.evaluations.space.variables)
-        self.curvature = np.full(shape, np.nan)
-        self._tried = False
+    def __init__(self, evaluations: Evaluations, tolerance: float) -> None:
+        self.evaluations, self.tolerance, self.repeats, self._tried = evaluations, tolerance, True, False
+        self.curvature = np.full((len(evaluations.problem.responses), len(evaluations.space.variables)), np.nan)
 
     def slopes(self, base: Evaluated, *, judged: bool = False) -> Slopes:
         """Return gradients at a completed design; `judged`: with an error estimate from further runs."""

@@ -78,25 +78,11 @@ class _Functions:
         self._residual = np.inf  # where they were judged last
         self.shortest = 0.0  # step between gradients: what is less is none
         self._violation, self._waited = np.inf, 0  # when it last became much less, and gradients since
-
-    @property
-    def has_level(self) -> bool:
-        return len(self._tops) > 1
-
-    @property
-    def start(self) -> Array:
-        x = self._place[self._free]
-        return np.append(x, self._rows(x)[self._tops].max()) if self.has_level else x
-
-    @property
-    def bounds(self) -> Array:
-        sides = [(0.0, 1.0)] * len(self._free) + [(-np.inf, np.inf)] * self.has_level
-        return np.array(sides)
-
-    @property
-    def constraints(self) -> list[NonlinearConstraint]:
+        self.has_level, x = len(self._tops) > 1, self._place[self._free]
+        self.start = np.append(x, self._rows(x)[self._tops].max()) if self.has_level else x
+        self.bounds = np.array([(0.0, 1.0)] * x.size + [(-np.inf, np.inf)] * self.has_level)
         limits = NonlinearConstraint(self.excesses, -np.inf, 0.0, jac=self.excess_gradients)
-        return [limits] if self._limits or self.has_level else []
+        self.constraints = [limits] if self._limits or self.has_level else []
 
     def objective(self, x: Array) -> float:
         return float(x[-1]) if self.has_level else float(self._rows(x)[self._tops[0]])
@@ -115,13 +101,13 @@ class _Functions:
         return np.column_stack([rows[self._tops], np.full(len(self._tops), -1.0)])
 
     def _rows(self, x: Array) -> Array:
-        evaluations = self._evaluations
-        one = self._at(x)
+        one, problem = self._at(x), self._evaluations.problem
         if not one.completed:
-            worse = np.isin(np.arange(len(evaluations.problem.responses)), self._tops) * FAILED
-            return evaluations.problem.scaled(self._good.values) + worse
-        self.best = best_of(evaluations, [self.best, one])
-        return evaluations.problem.scaled(one.values)
+            rows = problem.scaled(self._good.values)
+            rows[self._tops] += FAILED
+            return rows
+        self.best = best_of(self._evaluations, [self.best, one])
+        return problem.scaled(one.values)
 
     def _row_gradients(self, x: Array) -> Array:
         one = self._at(x)
@@ -131,11 +117,10 @@ class _Functions:
             if self._gradients and np.abs(np.subtract(one.place, self._good.place)).max() < self.shortest:
                 raise StalledError
             self._good = one
-            problem = self._evaluations.problem
+            problem, runs = self._evaluations.problem, self._evaluations.designs.count
             violation = problem.violation(one.readings)
             beyond = f", {100 * violation:.3g} % beyond a limit" if violation > KEPT else ""
-            runs = f"{self._evaluations.designs.count} runs"
-            self._tell(f"{problem.objective.text} {one.readings[0].value:.6g}{beyond}, {runs}")
+            self._tell(f"{problem.objective.text} {one.readings[0].value:.6g}{beyond}, {runs} runs")
             self._gradients[one.place] = self._gradients_at(one) * problem.factors(one.values)[:, None]
         return self._gradients[one.place]
 

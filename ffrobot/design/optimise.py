@@ -11,7 +11,7 @@ is limited, in equal ratios where both ends have one sign. Each search begins at
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 
@@ -29,7 +29,7 @@ from .evaluations import Differentiation, Evaluated, Evaluations, write_designs
 from .finding import CsvFile, TextTable, floats, with_unit
 from .local_search import Local, best_of, combinations, evolve, rank, search_from
 from .optimum_record import Optimum, Searched, parallel
-from .readings import Reading, Response
+from .readings import Response
 from .responses import DesignProblem, Limit, parse_response, read_problem, with_motors
 from .variables import DesignSpace, Place, read_space
 
@@ -51,7 +51,7 @@ def find_optimum(
 ) -> Optimum:
     """Optimize a scene: see `ffrobot.optimise`."""
     path, problem = runner.path, read_problem(minimise, maximise, subject_to)
-    space = read_space(path, vary)
+    space, table = read_space(path, vary), runner.folder / "designs.csv"
     problem = with_motors(problem, space)
     chosen = _method(space, method, runs)
     check_start(path, space, chosen)
@@ -64,11 +64,30 @@ def find_optimum(
         searches = _search(chosen, Differentiation(evaluations, tolerance), places, seed, runner.watcher)
     finally:
         if evaluations.searched:
-            write_designs(evaluations, runner.folder / "designs.csv")
+            write_designs(evaluations, table)
     best = min(searches, key=lambda one: rank(evaluations, one.best))
     if not best.best.completed:
         raise SolveError(f"{path}: no design could be run to its end; the first one: {evaluations.failures[0]}")
-    return _optimum(runner, chosen, evaluations, best, searches, tolerance)
+    with evaluations.designs.whole(best.best.design).results() as results:
+        verdict = results.verdict
+    point, folder = space.point(best.best.place), runner.folder / BEST
+    changes = {key: value for key, value, own in zip(space.keys, point, space.own, strict=True) if value != own}
+    scene = run_files(path, changes, folder).write(folder)
+    return Optimum(
+        scene=path,
+        problem=evaluations.problem,
+        space=space,
+        method=chosen,
+        **vars(best),
+        searches=tuple(searches),
+        runs=evaluations.designs.count,
+        failures=tuple(evaluations.failures),
+        tolerance=tolerance,
+        verdict=verdict,
+        best_scene=scene if runner.kept else None,
+        designs=table if runner.kept else None,
+        tried=tuple(evaluations.searched),
+    )
 
 
 def _method(space: DesignSpace, method: str, most: int) -> str:
@@ -99,7 +118,7 @@ def check_start(path: Path, space: DesignSpace, method: str) -> None:
 
 
 def _designs(runner: Runs, space: DesignSpace, responses: Sequence[Response], tolerance: float, most: int) -> Designs:
-    """Designs in `space`. Raises `InputError` for a bound that is impossible wherever the others are."""
+    """Designs in `space`. A bound that is impossible wherever the others are is refused."""
     fixed = changes_for(runner.path, responses, tolerance, keep_steps=may_repeat(space.keys))
     designs = Designs(runner, space.keys, space.own, fixed, most)
     others = [] if space.start_place is None else [space.start_place]
@@ -136,33 +155,6 @@ def _search(
     local = search_from(best.place, "slsqp", differentiation, watcher)
     words = "; ".join(text for text in (message, local.message) if text)
     return [Local(first, local.best, local.optimality, words)]
-
-
-def _optimum(
-    runs: Runs, method: str, evaluations: Evaluations, best: Local, searches: Sequence[Local], tolerance: float
-) -> Optimum:
-    space, problem = evaluations.space, evaluations.problem
-    with evaluations.designs.whole(best.best.design).results() as results:
-        verdict = results.verdict
-    point = space.point(best.best.place)
-    changes = {key: value for key, value, own in zip(space.keys, point, space.own, strict=True) if value != own}
-    folder = runs.folder / BEST
-    scene = run_files(runs.path, changes, folder).write(folder)
-    return Optimum(
-        scene=runs.path,
-        problem=problem,
-        space=space,
-        method=method,
-        **vars(best),
-        searches=tuple(searches),
-        runs=evaluations.designs.count,
-        failures=tuple(evaluations.failures),
-        tolerance=tolerance,
-        verdict=verdict,
-        best_scene=scene if runs.kept else None,
-        designs=runs.folder / "designs.csv" if runs.kept else None,
-        tried=tuple(evaluations.searched),
-    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -278,79 +270,62 @@ def find_front(
     if catalogue := next((v for v in space.variables if v.is_catalogue), None):
         raise InputError("--against: expected numbers between bounds", f"the discrete set of {catalogue.name}")
     check_start(path, space, "slsqp")
-    designs = _designs(runner, space, (*problem.responses, other), tolerance, runs)
-    return _Searches(runner, space, designs, problem, other, tolerance).front(points)
+    both, responses = (problem.objective, other), (*problem.responses, other)
+    designs = _designs(runner, space, responses, tolerance, runs)
+    tried: dict[Path, Evaluated] = {}
 
-
-@dataclass
-class _Searches:
-    runner: Runs
-    space: DesignSpace
-    designs: Designs
-    problem: DesignProblem
-    against: Response
-    tolerance: float
-    tried: dict[Path, Evaluated] = field(default_factory=dict)
-
-    def front(self, count: int) -> Front:
-        assert self.space.start_place is not None  # which `check_start` has seen to
-        first = self._least(self.problem, self.space.start_place, f"1 of {count}")
-        last = self._least(replace(self.problem, objective=self.against), first.best.place, f"{count} of {count}")
-        high, low = first.against, last.against
-        if high - low <= SAME * abs(high):
-            raise InputError(
-                f'--against: expected responses with different optima: where "{self.problem.objective.text}" is'
-                f' least, "{self.against.text}" is too'
-            )
-        points = [first]
-        spaced = np.geomspace if low * high > 0.0 else np.linspace  # equal ratios, or steps where the signs differ
-        for k, bound in enumerate(map(float, spaced(high, low, count)[1:-1]), start=2):
-            limits = (Limit(self.against, 1.0, bound), *self.problem.limits)
-            points.append(self._least(replace(self.problem, limits=limits), points[-1].best.place, f"{k} of {count}"))
-        unit, other = (one.unit for one in self._both(first.best))
-        responses = (*self.problem.responses, self.against)
-        tried = (
-            replace(one, readings=one.design.read(responses)) if one.completed else one for one in self.tried.values()
-        )
-        return Front(
-            scene=self.runner.path,
-            responses=(self.problem.objective.text, self.against.text),
-            units=(unit, other),
-            points=(*points, last),
-            runs=self.designs.count,
-            tolerance=self.tolerance,
-            space=self.space,
-            problem=self.problem,
-            tried=tuple(tried),
-        )
-
-    def _least(self, problem: DesignProblem, start: Place, title: str) -> FrontPoint:
-        evaluations, runner = Evaluations(self.designs, self.space, problem), self.runner
-        differentiation, local = Differentiation(evaluations, self.tolerance), None
+    def least(problem: DesignProblem, start: Place, k: int) -> FrontPoint:
+        evaluations, local, title = Evaluations(designs, space, problem), None, f"{k} of {points}"
+        differentiation = Differentiation(evaluations, tolerance)
         with suppress(SpentError):
             local = search_from(start, "slsqp", differentiation, runner.watcher, f"{title}: ")
         if local is None or local.spent:
-            most = self.designs.most
-            raise SolveError(f"{runner.path}: ended before {title} points after {most} runs, as many as allowed")
-        self.tried |= {one.design.folder: one for one in evaluations.searched}
+            raise SolveError(f"{path}: ended before {title} points after {runs} runs, as many as allowed")
+        tried.update((one.design.folder, one) for one in evaluations.searched)
         if not local.best.completed:
-            raise SolveError(f"{runner.path}: no design could be run to its end: {local.message}")
-        response, against = (one.value for one in self._both(local.best))
+            raise SolveError(f"{path}: no design could be run to its end: {local.message}")
+        response, against = (one.value for one in local.best.design.read(both))
         return FrontPoint(
-            point=self.space.point(local.best.place),
+            point=space.point(local.best.place),
             response=response,
             against=against,
-            price=self._price(local, evaluations.problem),
+            price=_price(local, evaluations.problem, other),
             feasible=evaluations.problem.keeps(local.best.readings),
             **vars(local),
         )
 
-    def _price(self, local: Local, problem: DesignProblem) -> float:
-        """Return ∂response/∂limit of the second response, the first limit: 0 if inactive, NaN at the ends."""
-        if local.optimality is None or not problem.limits or problem.limits[0].response is not self.against:
-            return np.nan
-        scale = problem.limits[0].scale * problem.factors(local.best.values)[0]
-        return float(-np.nan_to_num(local.optimality.limits[0]) / scale)
+    assert space.start_place is not None  # which `check_start` has seen to
+    first = least(problem, space.start_place, 1)
+    last = least(replace(problem, objective=other), first.best.place, points)
+    high, low = first.against, last.against
+    if high - low <= SAME * abs(high):
+        raise InputError(
+            f'--against: expected responses with different optima: where "{problem.objective.text}" is least,'
+            f' "{other.text}" is too'
+        )
+    front = [first]
+    spaced = np.geomspace if low * high > 0.0 else np.linspace  # equal ratios, or steps where the signs differ
+    for k, bound in enumerate(map(float, spaced(high, low, points)[1:-1]), start=2):
+        limits = (Limit(other, 1.0, bound), *problem.limits)
+        front.append(least(replace(problem, limits=limits), front[-1].best.place, k))
+    unit, other_unit = (one.unit for one in first.best.design.read(both))
+    whole = (replace(one, readings=one.design.read(responses)) if one.completed else one for one in tried.values())
+    return Front(
+        scene=path,
+        responses=(problem.objective.text, other.text),
+        units=(unit, other_unit),
+        points=(*front, last),
+        runs=designs.count,
+        tolerance=tolerance,
+        space=space,
+        problem=problem,
+        tried=tuple(whole),
+    )
 
-    def _both(self, one: Evaluated) -> tuple[Reading, ...]:
-        return one.design.read((self.problem.objective, self.against))
+
+def _price(local: Local, problem: DesignProblem, against: Response) -> float:
+    """Return ∂response/∂limit of the second response, the first limit: 0 if inactive, NaN at the ends."""
+    if local.optimality is None or not problem.limits or problem.limits[0].response is not against:
+        return np.nan
+    scale = problem.limits[0].scale * problem.factors(local.best.values)[0]
+    return float(-np.nan_to_num(local.optimality.limits[0]) / scale)

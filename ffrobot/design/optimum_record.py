@@ -63,21 +63,20 @@ def parallel(
     return Parallel(name="designs", title=title, axes=tuple(axes), states=states, best_label=best_label)
 
 
-def progress(problem: DesignProblem, designs: Sequence[Evaluated], states: tuple[State, ...]) -> Progress:
-    """The response of each design in the order of the search."""
-    values = numbers(one.values[0] if one.completed else np.nan for one in designs)
-    unit = next((one.readings[0].unit for one in designs if one.completed), "")
+def progress(problem: DesignProblem, designs: Sequence[Evaluated], lines: Parallel) -> Progress:
+    """The objective of each design in the order of the search, as `lines` have it."""
+    axis = lines.axes[-len(problem.responses)]
     kept = [
         problem.sense * one.values[0] if one.completed and problem.keeps(one.readings) else np.inf for one in designs
     ]
     return Progress(
         name="convergence",
         title=f"{problem.objective.text}, design by design",
-        y_label=with_unit(problem.objective.text, unit),
-        values=values,
-        states=states,
+        y_label=axis.label,
+        values=axis.values,
+        states=lines.states,
         best=numbers(problem.sense * np.minimum.accumulate(kept)),
-        logarithmic=axis_of_response("", values).logarithmic,
+        logarithmic=axis.logarithmic,
     )
 
 
@@ -275,7 +274,7 @@ class Optimum(Searched, Local):
         """Diagrams of all designs and of the convergence."""
         label = "best" if self.feasible else "nearest"
         designs = parallel(self.space, self.problem, self.tried, [self.best], label)
-        return [designs, progress(self.problem, self.tried, designs.states)]
+        return [designs, progress(self.problem, self.tried, designs)]
 
     def _limit_rows(self) -> Iterator[tuple[str, str, str, str, str]]:
         for k, (limit, price) in enumerate(zip(self.problem.limits, self.prices, strict=True)):

@@ -39,13 +39,13 @@ class Reading:
 
     value: float
     unit: str = ""
-    time: float = float("nan")
+    time: float = np.nan
     edge: Literal["", "first", "last"] = ""
     column: int = 0
     sign: float = 1.0
     mode: str = ""
-    coarse: float = float("nan")
-    missed_by: float = float("nan")
+    coarse: float = np.nan
+    missed_by: float = np.nan
     doubt: str = ""
     elsewhere: str = ""
 
@@ -117,9 +117,9 @@ class History:
     unit: str
     time: Array
     values: Array
-    largest: float = float("nan")
-    rms: float = float("nan")
-    mean: float = float("nan")
+    largest: float = np.nan
+    rms: float = np.nan
+    mean: float = np.nan
     is_in_doubt: bool = False
 
     def at(self, t: float, column: int, every: int = 1) -> float:
@@ -128,11 +128,10 @@ class History:
         With `every` = 2 every second of those about t alone is known, without the one next to it.
         """
         values, time = self.values[:, column], self.time
-        nearest = int(np.argmin(np.abs(time - t)))
         if every > 1 and time.size > every * SUPPORT:
-            first = (nearest + 1) % every
+            first = (int(np.argmin(np.abs(time - t))) + 1) % every
             values, time = values[first::every], time[first::every]
-            nearest = int(np.argmin(np.abs(time - t)))
+        nearest = int(np.argmin(np.abs(time - t)))
         step = time[1] - time[0] if time.size > 1 else 1.0
         if abs(time[nearest] - t) <= SAME * step:
             return float(values[nearest])
@@ -240,7 +239,7 @@ class Peak(Response):
             return Reading(float(np.fmax(history.largest, np.abs(history.values).max())))
         time = float({"first": history.time[0], "last": history.time[-1]}.get(nominal.edge, nominal.time))
         if not history.time[0] <= time <= history.time[-1]:
-            return Reading(float("nan"), elsewhere=f"the run ends at t = {history.time[-1]:g} s")
+            return Reading(np.nan, elsewhere=f"the run ends at t = {history.time[-1]:g} s")
         value, coarse = (nominal.sign * history.at(time, nominal.column, every) for every in (1, COARSE))
         k, column = _largest(history.values)
         now = history.values[k, column]
@@ -256,5 +255,5 @@ class Peak(Response):
 
 def _largest(values: Array) -> tuple[int, int]:
     """Output and column of the largest absolute value, the first one."""
-    k, column = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
+    k, column = np.unravel_index(np.abs(values).argmax(), values.shape)
     return int(k), int(column)

@@ -144,7 +144,7 @@ class OfFrequency(Response):
         body = self._body(results)
         modes = _modes(body)
         if nominal.mode not in modes:
-            return Reading(float("nan"), elsewhere=f"the link file has too few modes for {nominal.mode}")
+            return Reading(np.nan, elsewhere=f"the link file has too few modes for {nominal.mode}")
         return Reading(float(body.frequency[modes.index(nominal.mode)]))
 
     def _body(self, results: Results) -> ModalBody:
@@ -167,7 +167,7 @@ class OfMass(Response):
         if self.body:
             check_known(self.body, bodies, f'"{self.text}": expected a body ({quoted(bodies)})')
         mass = 0.0
-        for name in [self.body] if self.body else list(bodies):
+        for name in [self.body] if self.body else bodies:
             if name in results.modal_files:
                 mass += results.modal_mass(name)
             elif isinstance(rigid := bodies[name].get("rigid"), dict):
@@ -318,15 +318,11 @@ def with_motors(problem: DesignProblem, space: DesignSpace) -> DesignProblem:
 
 def parse_limit(text: str) -> Limit:
     """Return the limit that `text` states, such as `peak joints.elbow.moment <= 20`. Raises `InputError`."""
-    match = LIMIT.fullmatch(text.strip())
-    try:
-        bound = float(match["bound"]) if match else np.nan
-    except ValueError:
-        bound = np.nan
-    if match is None or not np.isfinite(bound):
-        raise InputError(
-            '--subject-to: expected "RESPONSE <= NUMBER" or "RESPONSE >= NUMBER", such as "peak joints.elbow.moment <='
-            ' 20"',
-            f'"{shown(text)}"',
-        )
-    return Limit(parse_response(match["response"], "--subject-to"), 1.0 if match["sense"] == "<=" else -1.0, bound)
+    with suppress(ValueError):
+        if (match := LIMIT.fullmatch(text.strip())) and np.isfinite(bound := float(match["bound"])):
+            sense = 1.0 if match["sense"] == "<=" else -1.0
+            return Limit(parse_response(match["response"], "--subject-to"), sense, bound)
+    raise InputError(
+        '--subject-to: expected "RESPONSE <= NUMBER" or "RESPONSE >= NUMBER", such as "peak joints.elbow.moment <= 20"',
+        f'"{shown(text)}"',
+    )

@@ -86,13 +86,11 @@ class _Study:
     def by_samples(self, count: int, seed: int, *, indices: bool) -> Uncertainty:
         """Return statistics of `count` points of a Latin hypercube (McKay, Beckman & Conover 1979)."""
         k = len(self._spreads)
+        cube = scipy.stats.qmc.LatinHypercube(2 * k if indices else k, optimization="random-cd", seed=seed)
+        u = cube.random(count // 2 if indices else count)
         if indices:
-            both = scipy.stats.qmc.LatinHypercube(2 * k, optimization="random-cd", seed=seed).random(count // 2)
-            a, b = both[:, :k], both[:, k:]
-            mixed = [np.where(np.arange(k) == i, b, a) for i in range(k)]
-            u = np.concatenate([a, b, *mixed])
-        else:
-            u = scipy.stats.qmc.LatinHypercube(k, optimization="random-cd", seed=seed).random(count)
+            a, b = np.hsplit(u, 2)
+            u = np.concatenate([a, b, *(np.where(np.arange(k) == i, b, a) for i in range(k))])
         columns = [spread.values(column) for spread, column in zip(self._spreads, u.T, strict=True)]
         points = [tuple(map(float, row)) for row in np.transpose(columns)]
         designs = self._designs.run(points)
@@ -104,7 +102,7 @@ class _Study:
         shares, explained = regression_shares(np.array(points[:n])[whole], values[:n][whole])
         complete = [design for design, is_whole in zip(designs[:n], whole, strict=True) if is_whole]
         blocks = values.reshape(-1, count // 2, len(self._responses)) if indices else None
-        return Uncertainty(
+        return self._found(
             method="samples",
             statistics=statistics(values[:n][whole]),
             bands=self._bands(complete, lambda nominal, of_designs: statistics(of_designs)),
@@ -113,7 +111,6 @@ class _Study:
             indices=sobol_indices(blocks[0], blocks[1], blocks[2:], seed) if blocks is not None else None,
             samples=values[:n],
             runs=1 + len(points),
-            **self._common(),
         )
 
     def by_gradients(self) -> Uncertainty:
@@ -131,7 +128,7 @@ class _Study:
             return linear_statistics(self._spreads, nominal, of_designs.reshape(len(self._spreads), 2, -1))
 
         of_responses, shares = linear(np.array([one.value for one in self._readings]), pairs)
-        return Uncertainty(
+        return self._found(
             method="gradients",
             statistics=of_responses,
             bands=self._bands(designs, lambda nominal, of_designs: linear(nominal, of_designs)[0]),
@@ -140,18 +137,18 @@ class _Study:
             indices=None,
             samples=np.zeros((0, len(self._responses))),
             runs=1 + len(sides),
-            **self._common(),
         )
 
-    def _common(self) -> dict[str, Any]:
-        return {
-            "scene": self._path,
-            "spreads": self._spreads,
-            "readings": {of.text: one for of, one in zip(self._responses, self._readings, strict=True)},
-            "failures": tuple(self._failures),
-            "notes": tuple(self._notes.values()),
-            "table": self._designs.table,
-        }
+    def _found(self, **by_method: Any) -> Uncertainty:
+        return Uncertainty(
+            scene=self._path,
+            spreads=self._spreads,
+            readings={of.text: one for of, one in zip(self._responses, self._readings, strict=True)},
+            failures=tuple(self._failures),
+            notes=tuple(self._notes.values()),
+            table=self._designs.table,
+            **by_method,
+        )
 
     def _read(self, design: Design) -> list[float]:
         """The responses, NaN where the design failed or does not have them."""
@@ -162,7 +159,7 @@ class _Study:
         except InputError as error:
             failure = str(error)
         self._failures.append(f"{self._where(design)}: {failure}")
-        return [float("nan")] * len(self._responses)
+        return [np.nan] * len(self._responses)
 
     def _follow(self, design: Design) -> list[float]:
         followed = design.follow(self._responses, self._readings)

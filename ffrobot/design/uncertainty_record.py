@@ -103,8 +103,8 @@ class Uncertainty(Finding):
             one = self.spreads[k]
             cells = [f"{100.0 * self.shares[g, k]:.1f} %"]
             if self.indices:
-                pairs = self.indices.named.values()
-                cells = [f"{with_error(100.0 * part[g, k], 100.0 * error[g, k])} %" for part, error in pairs]
+                pairs = (100.0 * np.array(pair)[:, g, k] for pair in self.indices.named.values())
+                cells = [f"{with_error(*pair)} %" for pair in pairs]
             rows.append((".".join(one.key), one.text.partition("=")[2], *cells))
         parts = self.indices.named if self.indices else ("share of the variance",)
         return TextTable(("key", "spread", *parts), rows, of=[*self.readings][g])
@@ -117,9 +117,8 @@ class Uncertainty(Finding):
     def _bands(self) -> Iterator[TextTable]:
         rows = []
         for band in self.bands:
-            width = band.statistics.quantiles[-1] - band.statistics.quantiles[0]
-            cells = [band.name, band.unit]
-            for values in (band.statistics.deviation, width):
+            cells, of = [band.name, band.unit], band.statistics
+            for values in (of.deviation, of.quantiles[-1] - of.quantiles[0]):
                 k = int(np.argmax(values))
                 cells += [f"{values[k]:.4g}", f"{band.time[k]:g}"]
             rows.append(cells)

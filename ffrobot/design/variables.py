@@ -8,6 +8,7 @@ import re
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -115,11 +116,8 @@ class DesignSpace:
 
     def start(self) -> tuple[float | None, ...]:
         """Coordinates of the scene itself; None where it is out of bounds or in no catalog."""
-        first, indices = 0, []
-        for variable in self.variables:
-            indices.append(variable.coordinate(self.own[first : first + len(variable.keys)]))
-            first += len(variable.keys)
-        return tuple(indices)
+        own = iter(self.own)
+        return tuple(variable.coordinate(tuple(islice(own, len(variable.keys)))) for variable in self.variables)
 
     @property
     def start_place(self) -> Place | None:
