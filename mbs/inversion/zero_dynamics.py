@@ -111,7 +111,7 @@ class Linearisation:
 
         Sizes of pairs ± s differ by round-off alone: sides do not.
         """
-        s = np.linalg.eigvals(first_order(self.dynamics, self.scale))
+        s = np.linalg.eigvals(first_order(self.dynamics, self.scale)).astype(complex)
         side: Array = is_unstable(s).astype(int) - is_unstable(-s)
         return np.take_along_axis(s, np.lexsort((s.imag, np.abs(s), side), axis=1), axis=1)
 
