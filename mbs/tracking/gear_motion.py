@@ -32,7 +32,6 @@ SHRUNK = 1.002, 1.1  # factor, and power of what exceeds them, by which they do
 LASTS = 20.0  # D/K after which a gear has come to rest
 GONE = 1e-12  # of the largest twist: decaying parts below it are none
 MANY = np.arange(40) / 40  # of an interval, where a polynomial is looked at for its largest value
-DEGREES = np.arange(len(TEN.c))
 # Coefficients of Legendre's polynomials of 2ξ − 1 by values at the points, and powers of ξ, lowest first, by these
 TO_SERIES = np.linalg.inv(
     np.polynomial.legendre.legvander(2 * TEN.c - 1, 9)  # type: ignore[no-untyped-call, unused-ignore]
@@ -197,10 +196,10 @@ def torques_beyond(model: Model, shares: Shares) -> Iterator[str]:
 
 def _through(breaks: Array, values: Array) -> PPoly:
     """Polynomials through values (N · 10, k) at points `TEN`, without what is rounding: their derivatives are used."""
-    h, at_nodes = np.diff(breaks), values.reshape(len(breaks) - 1, len(TEN.c), -1)
-    series = np.einsum("ij,Njk->Nik", TO_SERIES, at_nodes)
+    h = np.diff(breaks)
+    series = np.einsum("ij,Njk->Nik", TO_SERIES, values.reshape(len(h), len(TEN.c), -1))
     series = np.where(np.abs(series) > ROUNDING * np.abs(values).max(axis=0, initial=1e-300), series, 0.0)
-    powers = np.einsum("ij,Njk->iNk", POWERS, series) / h[None, :, None] ** DEGREES[:, None, None]
+    powers = np.einsum("ij,Njk->iNk", POWERS, series) / h[:, None] ** np.arange(len(TEN.c))[:, None, None]
     return scipy.interpolate.PPoly(powers[::-1], breaks)
 
 

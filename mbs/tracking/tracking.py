@@ -173,7 +173,7 @@ class Tracking(TimedAnalysis):
             return replace(run, details=around, twists=tracked.gears)
 
         run = at(times)
-        around = _with_torques_alone(context, run, around)
+        around = _with_torques_alone(context, self, run, around)
         statistics = replace(run.statistics, wall_seconds=time.perf_counter() - began, warnings=tuple(texts))
         return replace(run, details=around, statistics=statistics).with_look(lambda times: at(np.union1d(times, peaks)))
 
@@ -280,10 +280,8 @@ def _solve(context: Context, posed: Posed, analysis: Tracking, least: Tracked) -
     return tracked, objective
 
 
-def _with_torques_alone(context: Context, run: Run, around: TrackedPath) -> TrackedPath:
+def _with_torques_alone(context: Context, analysis: Tracking, run: Run, around: TrackedPath) -> TrackedPath:
     """With the distance from the path under the same torques without voltages, by forward simulation."""
-    analysis = run.analysis
-    assert isinstance(analysis, Tracking)
     alone = Forward(
         name="torques alone",
         kind="forward",

@@ -105,14 +105,13 @@ class Transition:
     @property
     def ranges(self) -> dict[str, Array]:
         """Least and largest values (2, …), SI units, by which shares count: limits, or sizes where there are none."""
-        of, weights = self.limits.patches, self.weights
-        rate = np.full_like(of.slew, weights.voltage / (weights.rate or RATE))
-        both = np.array([[-1.0], [1.0]])
+        of, weights, both = self.limits.patches, self.weights, np.array([[-1.0], [1.0]])
+        rate = weights.voltage / (weights.rate or RATE)
         pairs = {
-            "voltage": (of.range, both * np.full_like(of.slew, weights.voltage)),
+            "voltage": (of.range, both * weights.voltage),
             "slew": (both * of.slew, both * rate),
             "current": (both * of.current, both * rate * of.capacitance),
-            "torque": (both * self.limits.torque, both * np.full_like(self.limits.torque, weights.torque)),
+            "torque": (both * self.limits.torque, both * weights.torque),
         }
         ranges = {name: np.where(np.isfinite(limit), limit, size) for name, (limit, size) in pairs.items()}
         if self.tolerance is not None:
@@ -166,7 +165,7 @@ def displaced_at(servo: Servo, times: Array, off: Array) -> Servo:
 
 def displaced_along(servo: Servo, error: PPoly) -> Servo:
     """The robot with points off their paths by `error` (k,), m, up to round-off: quintic Hermite pieces."""
-    times = np.union1d(error.x, np.linspace(*error.x[[0, -1]], PIECES + 1))
+    times = np.union1d(error.x, np.linspace(error.x[0], error.x[-1], PIECES + 1))
     off = np.array([error(times, order) for order in range(3)])
     return _with_targets(servo, lambda target, k: through(times, target.sample(times) + off[:, :, k]))
 
