@@ -70,15 +70,14 @@ def write_map(poses: PoseMap) -> Path:
 
 
 def _table(poses: PoseMap) -> str:
-    """A line for each pose: the grid's coordinates, how it went, and all that is not a matrix."""
     plan = poses.plan
     grid = np.stack(np.meshgrid(*(axis.values for axis in plan.axes), indexing="ij"), axis=-1)
     names = [axis.name for axis in plan.axes]
-    columns = {name: column for name, column in zip(names, grid.reshape(-1, len(names)).T, strict=True)}
+    columns = dict(zip(names, grid.reshape(-1, len(names)).T, strict=True))
     for name, values in poses.values.items():
         if name.rpartition("/")[2] not in NOT_IN_TABLE:
             columns |= _columns(poses, name, values)
-    lines: list[list[object]] = [[*names, "status", *(name for name in columns if name not in names)]]
+    lines: list[list[object]] = [[*names, "status", *list(columns)[len(names) :]]]
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     for status, row in zip(poses.status, rows, strict=True):
         lines.append([*row[: len(names)], STATUS[status], *("" if x != x else x for x in row[len(names) :])])
@@ -173,8 +172,10 @@ def quantities(poses: PoseMap) -> dict[str, Quantity]:
         table["torque"] = Quantity(f"largest static {title}", np.fmax.reduce(np.abs(values["torque"]), axis=1), False)
     manipulability = _beyond(ROUND_OFF * reach ** values["place"].shape[1], values["manipulability"])
     table["manipulability"] = Quantity("manipulability", manipulability, True)
-    size = {name: float(np.abs(one.values[np.isfinite(one.values)]).max(initial=0.0)) for name, one in table.items()}
-    return {name: one._replace(values=_beyond(CONSTANT * size[name], one.values)) for name, one in table.items()}
+    for name, one in table.items():
+        size = np.abs(one.values).max(where=np.isfinite(one.values), initial=0.0)
+        table[name] = one._replace(values=_beyond(CONSTANT * size, one.values))
+    return table
 
 
 def _beyond(round_off: float, values: Array) -> Array:

@@ -115,7 +115,7 @@ def _moving_body(results: Results, analysis: str, name: str, frames: Indices) ->
     labels = [label for label in results.names(points) if label.startswith(f"{name}.")]
 
     def of_all(dataset: str, columns: int) -> Array:
-        names = [f"{points}/{label}/{dataset}" for label in labels]
+        names = (f"{points}/{label}/{dataset}" for label in labels)
         histories = [in_3d(results[name][frames]) for name in names if results.has(name)]
         return np.stack(histories, axis=1) if histories else np.zeros((len(frames), 0, columns))
 
@@ -123,12 +123,11 @@ def _moving_body(results: Results, analysis: str, name: str, frames: Indices) ->
     # x = Aᵀ (r − R) − Φ p, the same at all outputs
     at = (reached[0] - position[0]) @ of_quaternion(orientation[0]) - deflection[0]
     along = np.argsort(at[:, 0], kind="stable")
-    modal = results.modal(analysis, name)[frames] if name in results.modal_files else None
     return MovingBody(
         name=name,
         position=position,
         orientation=orientation,
-        modal=modal,
+        modal=results.modal(analysis, name)[frames] if name in results.modal_files else None,
         point_names=tuple(labels[i] for i in along),
         points=at[along],
         deflection=deflection[:, along],
@@ -168,9 +167,6 @@ def visible_exaggeration(size: float, deflection: float) -> float:
     return max((s for s in steps if s * deflection <= VISIBLE_DEFORMATION * size), default=1.0)
 
 
-PLACES = ("x", "y", "z")  # components of trajectories that are places
-
-
 @struct
 class PointTarget:
     """Prescribed position of a point: its `columns`, of x, y, z, and their values `wanted` (T, columns), m."""
@@ -203,8 +199,8 @@ def targets(results: Results, analysis: str) -> list[PointTarget]:
             continue
         wanted, common = results.data(f"{groups[holder]}/target"), min(len(results.time(holder)), len(time))
         if np.allclose(time[:common], results.time(holder)[:common], rtol=0, atol=1e-12):
-            components = [str(c) for c in results.attributes(groups[holder])["components"]]
-            columns = tuple(PLACES.index(c) for c in components if c in PLACES)
+            components = map(str, results.attributes(groups[holder])["components"])
+            columns = tuple("xyz".index(c) for c in components if c in "xyz")  # not mx, my, mz
             wanted = wanted[:common, : len(columns)]
             followed.append(PointTarget(trajectory["name"], trajectory["point"], columns, wanted))
     return followed
@@ -243,9 +239,9 @@ def joint_markers(scene: Mapping[str, Any], bodies: Sequence[MovingBody]) -> lis
 def tool_marker(point: str, bodies: Sequence[MovingBody]) -> Marker:
     """Return the section "BODY.POINT" with its axes x, y, z, without them in planar scenes."""
     position, exaggeration = _place(point, bodies)
-    T, is_known = len(position), any(body.sections.size for body in bodies)
-    axes = section_axes(bodies, point, T).swapaxes(1, 2) if is_known else np.zeros((T, 0, 3))
-    return Marker(point, position, exaggeration, axes)
+    axes = section_axes(bodies, point, len(position)).swapaxes(1, 2)
+    is_known = any(body.sections.size for body in bodies)
+    return Marker(point, position, exaggeration, axes if is_known else axes[:, :0])
 
 
 def tool_markers(targets: Iterable[PointTarget], bodies: Sequence[MovingBody]) -> list[Marker]:

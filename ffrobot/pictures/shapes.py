@@ -92,12 +92,13 @@ def coarsened(points: Array, triangles: Integers, limit: int) -> tuple[Indices, 
     used, inverse = np.unique(triangles, return_inverse=True)
     if len(triangles) <= limit:
         return used, inverse.reshape(-1, 3)
-    extent = np.ptp(points[used], axis=0)
-    low, high = 0.0, float(extent.max())
-    kept, coarse = _clustered(points[used], inverse.reshape(-1, 3), np.minimum(high, extent / LAYERS))
+    seen, triangles = points[used], inverse.reshape(-1, 3)
+    largest = np.ptp(seen, axis=0) / LAYERS
+    low, high = 0.0, LAYERS * float(largest.max())
+    kept, coarse = _clustered(seen, triangles, largest)
     for _ in range(12):
         size = 0.5 * (low + high)
-        trial = _clustered(points[used], inverse.reshape(-1, 3), np.minimum(size, extent / LAYERS))
+        trial = _clustered(seen, triangles, np.minimum(size, largest))
         if len(trial[1]) > limit:
             low = size
         else:

@@ -45,8 +45,8 @@ def print_details(solution: Solution, results: Results, console: Console) -> Non
     for line in _control_lines(_details(solution)):
         console.print(line)
     notes = Table.grid(padding=(0, 2))
-    for title, text in _notes(solution):
-        notes.add_row(title, text)
+    for note in _notes(solution):
+        notes.add_row(*note)
     console.print()
     console.print(notes)
     console.out(f"results    {results.path}")
@@ -74,8 +74,8 @@ def _tables(solution: Solution, results: Results) -> Iterator[Table]:
     stresses = (row for name, result in solution.analyses.items() for row in _stresses(name, result))
     yield from named_tables("stress in", stresses)
     details = _details(solution).items()
-    linear = ((name, one) for name, one in details if isinstance(one, LinearModels))
-    yield from named_tables("linear model", (row for of_one in linear for row in _linear(*of_one)))
+    linear = (row for name, one in details if isinstance(one, LinearModels) for row in _linear(name, one))
+    yield from named_tables("linear model", linear)
     at_rest = ((name, one) for name, one in details if isinstance(one, LinearModels | RobotAtRest))
     yield from named_tables("joints", (row for of_one in at_rest for row in _conditions(*of_one)))
 
@@ -138,10 +138,9 @@ def _chosen_modes(bodies: Sequence[Body], choice: ModeChoice) -> str:
                 f"{name}: with fewer ({choice.tried[-2]}) results differ by {max(choice.before[name].values()):.0e}"
             )
     tried = ", ".join(map(str, choice.tried))
-    fewer = {body.name: body.reduction.lowest for body in bodies if body.reduction is not None}
+    fewer = [f"modes = {body.reduction.lowest} for {body.name}" for body in bodies if body.reduction is not None]
     if fewer:
-        keys = ", ".join(f"modes = {lowest} for {name}" for name, lowest in fewer.items())
-        lines.append(f"the same without search: {keys}")
+        lines.append(f"the same without search: {', '.join(fewer)}")
     lines.append(
         f"solved with {tried} modal coordinates, {choice.seconds:.2f} s before the last; the highest frequency is"
         f" {choice.highest[0]:.3g} of {choice.highest[1]:.3g} rad/s"
@@ -195,7 +194,6 @@ def _stiffness(compliance: Array) -> tuple[str, str]:
 
 
 def _control_lines(details: Mapping[str, Details]) -> Iterator[str]:
-    """Explain closed loops, a line each: columns, damping ratios, zeros, unreached modes."""
     loops = {name: record.metrics for name, record in details.items() if isinstance(record, LoopRecord)}
     if loops:
         yield f"closed-loop control: {DEFINITIONS}"

@@ -71,7 +71,7 @@ def _points(model: Model, q: Array) -> Iterator[tuple[str, str, str]]:
     tools = [tool.reference for tool in model.scene.tool]
     for point in dict.fromkeys([*(path.point for path in model.scene.trajectory if path.point is not None), *tools]):
         pose = places.at(tree.section(point))
-        angles = rpy_of(pose.F[0])[2:] if space.is_plane else rpy_of(pose.F[0])
+        angles = rpy_of(pose.F[0])[2 * space.is_plane :]
         turned = ", ".join(_in(angle, "rad") for angle in angles) if point in tools else ""
         yield point, ", ".join(f"{round(x, 9) + 0.0:.5g}" for x in space.along(pose.r[0])), turned
 

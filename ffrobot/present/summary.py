@@ -97,7 +97,6 @@ def _motor(name: str, motor: MotorFeasibility, one: AnalysisVerdict) -> Row:
 
 
 def _texts(verdict: Verdict, remarks: Sequence[str]) -> Iterator[str]:
-    """Warnings, `remarks`, advice, robots at rest and notes, once for all analyses that have them."""
     warnings = ((one.name, text) for one in verdict.analyses for text in one.warnings)
     advice = ((one.name, text) for one in verdict.analyses for text in one.advice)
     yield from _labelled("warning", alike(warnings))

@@ -131,9 +131,7 @@ def draw_bode(figure: FigureRecord, results: Results) -> Figure:
         magnitude.loglog(hertz, np.abs(response), color=color, label=f"{source} → {target}", linewidth=0.9)
         phase.semilogx(hertz, np.degrees(np.angle(response)), color=color, linewidth=0.9)
     phase.margins(x=0)
-    phase.set_yticks([-180, -90, 0, 90, 180])
-    phase.set_xlabel("frequency (Hz)")
-    phase.set_ylabel("phase (°)")
+    phase.set(yticks=[-180, -90, 0, 90, 180], xlabel="frequency (Hz)", ylabel="phase (°)")
     magnitude.set_ylabel(figure.y_label or "magnitude (SI)")
     legend(magnitude)
     return picture
@@ -142,8 +140,8 @@ def draw_bode(figure: FigureRecord, results: Results) -> Figure:
 def draw_robot_modes(figure: FigureRecord, results: Results) -> Figure:
     """Draw the lowest modes of the robot that vibrate, over its configuration (gray), in both directions."""
     assert figure.analysis is not None
-    k = _nearest(results, figure)
-    frequency = results[f"{figure.analysis}/linear/frequency"][k]
+    k, group = _nearest(results, figure), f"{figure.analysis}/linear"
+    frequency = results[f"{group}/frequency"][k]
     shown = np.flatnonzero(frequency > 0.0)[:SHAPES]
     rows = max(1, -(-len(shown) // COLUMNS))
     picture = Figure(figsize=(2 * SIZE[0], (2.1 if results.space.is_plane else 2.6) * rows), layout="constrained")
@@ -155,8 +153,7 @@ def draw_robot_modes(figure: FigureRecord, results: Results) -> Figure:
     for number, mode in enumerate(shown, 1):
         axes = SceneAxes(picture.add_subplot(rows, COLUMNS, number), PLANE if results.space.is_plane else SPACE)
         axes.axes.set_title(f"{mode + 1}: {frequency[mode]:.4g} Hz", loc="left")
-        group = f"{figure.analysis}/linear/modes"
-        ways = [_way(results, group, shape, k, int(mode)) for shape in shapes]
+        ways = [_way(results, f"{group}/modes", shape, k, int(mode)) for shape in shapes]
         scale = AMPLITUDE * size / max(np.linalg.norm(np.vstack(ways), axis=1).max(), 1e-300)
         for at, shape, way in zip(places, shapes, ways, strict=True):
             axes.body(at, shape.cells, "#9a9a9a", 0.8)

@@ -2,8 +2,7 @@
 
 import fnmatch
 import warnings
-from collections.abc import Collection, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Collection, Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -163,14 +162,13 @@ def _edge_depth(cells: Integers, depth: Array, edges: Integers) -> tuple[Integer
 
 def _outline(points: Array, cells: Integers, viewer: Array) -> Integers:
     """(e, 2) the edges along which a surface folds or ends, or turns away from a viewer; of a line, all of it."""
-    corners = cells.shape[1]
-    if corners == 2:
+    if cells.shape[1] == 2:
         return cells
     normal = normals(points, cells)
     edges, number = np.unique(np.sort(sides(cells), axis=1), axis=0, return_inverse=True)
     number = number.ravel()
     order = np.argsort(number, kind="stable")  # cells with the same edge follow each other
-    owner, number = order // corners, number[order]
+    owner, number = order // cells.shape[1], number[order]
     paired = np.flatnonzero(number[1:] == number[:-1])
     one, other = normal[owner[paired]], normal[owner[paired + 1]]
     smooth = np.abs(np.einsum("ei,ei->e", one, other)) > FOLD
@@ -212,13 +210,17 @@ def _draw_columns(axes: Axes, curve: Curve, k: int, figure: FigureRecord, result
         look: dict[str, Any] = {"color": LIMIT, "alpha": 0.25, "linewidth": 0, "label": label}
         axes.fill_between(time, 0.0, 1.0, where=at_limit.any(axis=1), transform=axes.get_xaxis_transform(), **look)
     if count == 1:
-        look = line_style(k, len(time), alone=len(figure.curves) == 1)
-        axes.plot(time, values[:, 0], label=curve.label, **look)
+        _draw_line(axes, curve, k, figure, time, values)
         return
     for column, color in enumerate(shades(count)):
         label = f"{curve.label} {column + 1}" if count <= NAMED or column in (0, count - 1) else None
         dashes = DASHES[column % len(DASHES)] if count <= MANY else "-"
         axes.plot(time, values[:, column], color=color, linestyle=dashes, linewidth=0.7, label=label)
+
+
+def _draw_line(axes: Axes, curve: Curve, k: int, figure: FigureRecord, x: Array, values: Array) -> None:
+    look = line_style(k, len(x), alone=len(figure.curves) == 1)
+    axes.plot(x, values[:, 0], label=curve.label, **look)
 
 
 def _is_at_limit(values: Array, limits: tuple[float, ...]) -> Array:
@@ -235,23 +237,17 @@ def _draw_map(axes: Axes, time: Array, values: Array, label: str, figure: Figure
     picture.set_data(time, np.arange(1, count + 1), values.T)
     picture.set_clim(-limit, limit)
     axes.add_image(picture)
-    axes.set_xlim(time[0], time[-1])
-    axes.set_ylim(0.5, count + 0.5)
-    axes.set_yticks(range(1, count + 1))
+    axes.set(xlim=(time[0], time[-1]), ylim=(0.5, count + 0.5), yticks=range(1, count + 1), ylabel=label)
     axes.grid(visible=False)
-    axes.set_ylabel(label)
     axes.figure.colorbar(picture, ax=axes, label=figure.y_label)
 
 
 def _draw_torque_speed(axes: Axes, figure: FigureRecord, results: Results) -> None:
     for k, curve in enumerate(figure.curves):
-        speed, values = curve_points(results, curve, figure.scale)
-        look = line_style(k, len(speed), alone=len(figure.curves) == 1)
-        axes.plot(speed, values[:, 0], label=curve.label, **look)
+        _draw_line(axes, curve, k, figure, *curve_points(results, curve, figure.scale))
     if len(limits := motor_limits(results, figure)):
         axes.plot(*limits.T, color=LIMIT, linestyle="--", label="limits")
-    axes.set_xlabel(figure.x_label)
-    axes.set_ylabel(figure.y_label)
+    axes.set(xlabel=figure.x_label, ylabel=figure.y_label)
     legend(axes)
 
 
@@ -267,9 +263,8 @@ def _draw_placement(axes: Axes, figure: FigureRecord, results: Results) -> None:
     for k, (key, label) in enumerate((("best", "found"), ("even", "evenly spaced"))):
         places = [(x - length / 2, length) for x in results[f"{group}/{key}/centers"]]
         axes.broken_barh(places, (-0.12 * (k + 1), 0.08), facecolor=COLORS[k], edgecolor="white", label=label)
-    axes.set_yticks([0.0, 0.25, 0.5, 0.75, 1.0])
-    axes.set_xlabel(f"distance along {body} (m)")
-    axes.set_ylabel("controllability by one patch")
+    x_label, y_label = f"distance along {body} (m)", "controllability by one patch"
+    axes.set(yticks=np.linspace(0.0, 1.0, 5), xlabel=x_label, ylabel=y_label)
     legend(axes)
 
 
@@ -316,30 +311,27 @@ def plot_file(path: Path, folder: Path, formats: Sequence[str] = FORMATS, only: 
         names = _chosen(dict.fromkeys(record.name for record in records), only)
         for record in (each for each in records if each.name in names):
             label = f'{figure_file if is_own else path}: figure "{record.name}"'
-            with of_file(label), _formulas(label) if is_own else nullcontext():
-                picture = draw(record, results)
-                written += write_figure(picture if is_own else literal(picture), folder, record.name, formats)
+            try:
+                with of_file(label):
+                    picture = draw(record, results)
+                    written += write_figure(picture if is_own else literal(picture), folder, record.name, formats)
+            except ValueError as error:  # of matplotlib: a formula between `$` that is none, a range
+                if not is_own:
+                    raise
+                raise InputError(f"{label}: {str(error).strip().splitlines()[0]}") from None
     return written
 
 
-@contextmanager
-def _formulas(label: str) -> Iterator[None]:
-    """What matplotlib cannot draw of a figure that the user describes: a formula between `$` that is none, a range."""
-    try:
-        yield
-    except ValueError as error:
-        raise InputError(f"{label}: {str(error).strip().splitlines()[0]}") from None
-
-
 def _chosen(names: Collection[str], only: Sequence[str]) -> list[str]:
-    """Those that are, or are like, one of `only`; all without."""
+    fitting = set[str]()
     for pattern in only:
-        if not any(fnmatch.fnmatchcase(name, pattern) for name in names):
+        fitting.update(found := fnmatch.filter(names, pattern))
+        if not found:
             raise InputError(
                 f"--only: expected the name of a figure, or a pattern that fits one ({quoted(names)})",
                 f'"{pattern}"{did_you_mean(pattern, names)}',
             )
-    return [name for name in names if not only or any(fnmatch.fnmatchcase(name, pattern) for pattern in only)]
+    return [name for name in names if not only or name in fitting]
 
 
 def draw(record: FigureRecord, results: Results) -> Figure:
@@ -359,8 +351,8 @@ def draw(record: FigureRecord, results: Results) -> Figure:
 def write_figure(picture: Figure, folder: Path, name: str, formats: Sequence[str] = FORMATS) -> list[Path]:
     """Write a picture as DIR/NAME.FORMAT in all formats; returns the files."""
     paths = [folder / f"{name}.{extension}" for extension in formats]
-    for path, extension in zip(paths, formats, strict=True):
-        write_atomically(path, image_of(picture, extension), "figure", make_folder=True)
+    for path in paths:
+        write_atomically(path, image_of(picture, path.suffix[1:]), "figure", make_folder=True)
         picture.set_layout_engine(None)  # other formats take the layout of the first: two of four drawings less
     return paths
 

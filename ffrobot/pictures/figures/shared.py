@@ -167,9 +167,8 @@ def both_ways(limit: float | list[float]) -> tuple[float, ...]:
 def file_name(*parts: str) -> str:
     """Return a file name: everything but letters, digits, `.` and `-` becomes `_`, with digits of a hash for others."""
     joined = "_".join(parts)
-    plain = re.sub(r"[^A-Za-z0-9.-]", "_", joined)
     mark = f"-{hashlib.sha256(joined.encode()).hexdigest()[:6]}" if re.search(r"[^\w /.-]", joined, re.A) else ""
-    return plain + mark
+    return re.sub(r"[^A-Za-z0-9.-]", "_", joined) + mark
 
 
 def curve_points(results: Results, curve: Curve, scale: float) -> tuple[Array, Array]:
@@ -204,7 +203,7 @@ def motor_limits(results: Results, figure: FigureRecord) -> Array:
     """Return the limits (n, 2) of a motor, speeds and moments in the units of the diagram; see `limit_curves`."""
     assert figure.joint is not None
     points = [curve_points(results, curve, figure.scale) for curve in figure.curves]
-    speed, moment = (max(float(abs(pair[i]).max()) for pair in points) for i in (0, 1))
+    speed, moment = (max(float(abs(one).max()) for one in each) for each in zip(*points, strict=True))
     # Each coordinate of a joint has its limits: those of the one that the first curve is of, "…/moment[1]".
     number = int(figure.curves[0].data.partition("[")[2].rstrip("]") or 0)
     limits = [coordinate.limits for coordinate in joint_coordinates(results.scene, figure.joint)]
@@ -216,8 +215,8 @@ def limit_curves(limits: MotorLimits, speed: float, moment: float) -> Array:
 
     Units are those of `speed` and `moment`, the largest of the data, as far as which curves go that no limit ends.
     """
-    has_moment, has_speed, has_power = np.isfinite([limits.moment, limits.speed, limits.power])
-    if not (has_moment or has_speed or has_power):
+    has_moment, has_speed, has_power = known = np.isfinite([limits.moment, limits.speed, limits.power])
+    if not known.any():
         return np.empty((0, 2))
     power = limits.power if has_power else 0.0  # without that limit nothing asks for more than the data
     speed_end = limits.speed if has_speed else MARGIN * max(speed, power / limits.moment, 1e-300)

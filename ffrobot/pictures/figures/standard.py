@@ -68,15 +68,18 @@ def _histories(
         yield FigureRecord(name=file_name(*name), title=title, curves=drawn, y_label=y_label, **more)
 
 
+def _of_analysis(kind: str, title: str, analysis: str, *names: str, **more: Any) -> FigureRecord:
+    more |= {"kind": kind, "name": file_name(kind, analysis, *names)}
+    return FigureRecord(title=f"{title}, {analysis}", analysis=analysis, **more)
+
+
 def _configurations(results: Results) -> Iterator[FigureRecord]:
     """Of the first analysis that goes through time, else the first: in others the robot is hardly elsewhere."""
     moving = [analysis for analysis in results.analyses if len(results.time(analysis)) > 1]
     for analysis in [*moving, *results.analyses][:1]:
         outputs = results.time(analysis)
         snapshots = np.linspace(outputs[0], outputs[-1], 5 if len(outputs) > 1 else 1)
-        name, title = file_name("configurations", analysis), f"robot postures, {analysis}"
-        times = tuple(map(float, snapshots))
-        yield FigureRecord(name=name, title=title, kind="configurations", analysis=analysis, times=times)
+        yield _of_analysis("configurations", "robot postures", analysis, times=tuple(map(float, snapshots)))
 
 
 def _paths(results: Results) -> Iterator[FigureRecord]:
@@ -115,8 +118,8 @@ def _path_errors(results: Results) -> Iterator[FigureRecord]:
         limit = results.attributes(part).get("path_tolerance", 0.0) if results.has(part) else 0.0
         for name in results.names(f"{analysis}/trajectories") if limit else ():
             group = f"{analysis}/trajectories/{name}"
-            of_points = ((k, c) for k, c in enumerate(_components(results, group)) if c in AXES)
-            curves = [Curve(data=f"{group}/error[{k}]", label=c) for k, c in of_points]
+            components = enumerate(_components(results, group))
+            curves = [Curve(data=f"{group}/error[{k}]", label=c) for k, c in components if c in AXES]
             title, limits = f"path error of {name}, {analysis}", both_ways(1e3 * limit)
             yield from _histories(("path_error", analysis, name), title, curves, "error (mm)", scale=1e3, limits=limits)
 
@@ -249,8 +252,8 @@ def _stresses(results: Results) -> Iterator[FigureRecord]:
 
 def _energies(results: Results) -> Iterator[FigureRecord]:
     for analysis in results.analyses:
-        names = ((kind, f"{analysis}/energy/{kind}") for kind in ("kinetic", "strain", "gravitational"))
-        curves = (Curve(data=data, label=kind) for kind, data in names if results.has(data))
+        kinds = ("kinetic", "strain", "gravitational")
+        curves = (Curve(data=of, label=kind) for kind in kinds if results.has(of := f"{analysis}/energy/{kind}"))
         yield from _histories(("energy", analysis), f"energies, {analysis}", curves, "energy (J)")
 
 
@@ -260,29 +263,27 @@ def _voltages(results: Results) -> Iterator[FigureRecord]:
         if results.attributes(analysis)["kind"] == "motors-only":
             continue  # round-off
         for body in results.names(f"{analysis}/pzt"):
-            required, within = f"{analysis}/pzt/{body}/required_voltage", f"{analysis}/pzt/{body}/voltage"
-            top = np.abs(results.data(required)).max()
-            of = f"patches of {body}, {analysis}"
-            cut = np.abs(results.data(within) - results.data(required)).max() > SEEN * top
+            group = f"{analysis}/pzt/{body}"
+            required = results.data(f"{group}/required_voltage")
+            top = np.abs(required).max()
+            cut = np.abs(results.data(f"{group}/voltage") - required).max() > SEEN * top
             limit = () if limits.get(body) is None else both_ways(limits[body])
-            for data, title, is_shown in (
-                (required, f"required voltages, {of}", top > 0.0),
-                (within, f"voltages within the limit, {of}", cut),
+            for key, what, is_shown in (
+                ("required_voltage", "required voltages", top > 0.0),
+                ("voltage", "voltages within the limit", cut),
             ):
-                curves = [Curve(data=data, label="patch")] if is_shown else []
-                name = (data.rpartition("/")[2], analysis, body)
-                yield from _histories(name, title, curves, "voltage (V)", limits=limit)
+                curves = [Curve(data=f"{group}/{key}", label="patch")] if is_shown else []
+                title = f"{what}, patches of {body}, {analysis}"
+                yield from _histories((key, analysis, body), title, curves, "voltage (V)", limits=limit)
 
 
 def _linear(results: Results) -> Iterator[FigureRecord]:
     """Places of patches; of linear models the mode shapes of the robot, and responses to the first input."""
     for analysis in results.analyses:
         if results.has(f"{analysis}/placement"):
-            name, title = file_name("placement", analysis), f"patches, {analysis}"
-            yield FigureRecord(name=name, title=title, kind="placement", analysis=analysis)
+            yield _of_analysis("placement", "patches", analysis)
         if results.has(f"{analysis}/linear"):
-            name, title = file_name("modes", analysis), f"modes, {analysis}"
-            yield FigureRecord(name=name, title=title, kind="modes", analysis=analysis)
+            yield _of_analysis("modes", "modes", analysis)
             yield from islice(_responses_of(results, analysis), 1)
 
 
@@ -300,14 +301,8 @@ def _responses_of(results: Results, analysis: str) -> Iterator[FigureRecord]:
         is_first = source.startswith("joint/") or (source.startswith("pzt/") and source.endswith("/1"))
         seen = tuple((source, name) for name in outputs if name.startswith("point/") or name == source)
         if is_first and seen:
-            yield FigureRecord(
-                name=file_name("bode", analysis, source.replace("/", "_")),
-                title=f"response to {source}, {analysis}",
-                kind="bode",
-                analysis=analysis,
-                transfers=seen,
-                y_label="magnitude (m, rad per N·m, V)",
-            )
+            title, y_label = f"response to {source}", "magnitude (m, rad per N·m, V)"
+            yield _of_analysis("bode", title, analysis, source.replace("/", "_"), transfers=seen, y_label=y_label)
 
 
 Figures = tuple[Callable[[Results], Iterator[FigureRecord]], ...]

@@ -211,7 +211,7 @@ class SceneAxes:
         if is_equal:
             self.axes.set_aspect("equal", adjustable="datalim")
         self.axes.autoscale_view()
-        if np.any(self.view.viewer == 1.0) or np.any(self.view.viewer == -1.0):
+        if np.any(np.abs(self.view.viewer) == 1.0):
             right, up = ("xyz"[int(np.argmax(np.abs(one)))] for one in (self.view.right, self.view.up))
             self.axes.set_xlabel(f"{right} (m)", fontsize=label_size)
             self.axes.set_ylabel(f"{up} (m)", fontsize=label_size)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, NDArray
+from ...common.arrays import Array, Indices, NDArray
 from ...results.file import Results
 from ...results.verdict import ROUND_OFF
 from ..figures.shared import Curve, FigureRecord, curve_points, file_name, motor_limits
@@ -90,9 +90,9 @@ class Chart:
         if "visible" not in style:
             self.top = max(self.top, float(np.nanmax(np.abs(y), initial=0.0)))
         mode = "lines" if len(y) > 1 else "markers"
-        self.traces.append({"type": "scatter", "mode": mode, "name": plain(label), **_coordinates(x, y), **style})
         if mode == "lines":  # else Plotly leaves out points that it takes for straight: corners on smooth curves
-            self.traces[-1]["line"] = {**self.traces[-1].get("line", {}), "simplify": False}
+            style["line"] = style.get("line", {}) | {"simplify": False}
+        self.traces.append({"type": "scatter", "mode": mode, "name": plain(label), **_coordinates(x, y), **style})
 
     @property
     def layout(self) -> dict[str, Any]:
@@ -131,7 +131,7 @@ def encoded(values: NDArray[Any], kind: str = "f4") -> dict[str, str]:
     array = np.ascontiguousarray(values, dtype=f"<{kind}")
     entry = {"dtype": kind, "bdata": b64encode(array.tobytes()).decode("ascii")}
     if array.ndim == 2:
-        entry["shape"] = f"{array.shape[0]}, {array.shape[1]}"
+        entry["shape"] = ", ".join(map(str, array.shape))
     return entry
 
 
@@ -148,11 +148,11 @@ def style(k: int, color: int | None = None, part: int = 0) -> dict[str, Any]:
 def shades(count: int) -> list[str]:
     """Colors of `count` ordered series, dark to light."""
     where = np.linspace(0.0, len(SHADES) - 1.0, count)
-    channels = [np.interp(where, np.arange(len(SHADES)), SHADES[:, k]) for k in range(3)]
+    channels = [np.interp(where, np.arange(len(SHADES)), channel) for channel in SHADES.T]
     return [f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in zip(*channels, strict=True)]
 
 
-def kept_outputs(values: Array) -> np.ndarray[Any, np.dtype[np.intp]]:
+def kept_outputs(values: Array) -> Indices:
     """Return indices (k,) of `values` (T,), of any unit, to draw: all, or the smallest and largest of each stretch."""
     if len(values) <= MAX_POINTS or np.isnan(values).any():
         return np.arange(len(values))
@@ -213,16 +213,16 @@ FOLDS = (
     ("Deflections", ("deflection_",)),
     ("Stresses", ("stress_",)),
     ("Patches", ("voltage_", "required_voltage_")),
+    ("Bodies and energies", ("",)),
 )
-"""Parts of the page that fold, by how names of their charts begin; the others come last."""
+"""Parts of the page that fold, by how names of their charts begin; the last has all others."""
 
 
 def folded(charts: Sequence[Chart]) -> list[tuple[str, list[Chart]]]:
     """Group charts by the part of the page; empty parts are omitted."""
-    parts: dict[str, list[Chart]] = {title: [] for title in (*(title for title, _ in FOLDS), "Bodies and energies")}
+    parts: dict[str, list[Chart]] = {title: [] for title, _ in FOLDS}
     for chart in charts:
-        fits = (title for title, starts in FOLDS if chart.name.startswith(starts))
-        parts[next(fits, "Bodies and energies")].append(chart)
+        parts[next(title for title, starts in FOLDS if chart.name.startswith(starts))].append(chart)
     return [(title, members) for title, members in parts.items() if members]
 
 

@@ -56,7 +56,7 @@ def mechanism(runs: Sequence[AnalysisRun]) -> tuple[dict[str, Any], list[str]]:
         "runs": entries,
         "exaggeration": visible_exaggeration(size, largest_deflection(seen)),
         "speed": max(end / 8.0, 1e-3),  # plays for 8 s; the slider's end
-        "range": [[float(low[i] - margin[i]), float(high[i] + margin[i])] for i in range(3)],
+        "range": np.stack([low - margin, high + margin], axis=1).tolist(),
         "size": size,
         "is_plane": is_plane,
         "view": {name: axis.tolist() for name, axis in (PLANE if is_plane else SPACE)._asdict().items()},

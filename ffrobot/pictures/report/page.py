@@ -58,12 +58,11 @@ def _bending(results: Results, analysis: str) -> Iterator[Cells]:
     for body in results.names(f"{analysis}/bodies"):
         about = results.attributes(f"{analysis}/bodies/{body}")
         if "largest_deflection" in about:
-            values = {key: float(f"{scale * about[of]:.2g}") for key, (of, scale) in BENDING.items()}
-            yield {"link": body} | {key: f"{value:g}" for key, value in values.items()}
+            values = {key: f"{float(f'{scale * about[of]:.2g}'):g}" for key, (of, scale) in BENDING.items()}
+            yield {"link": body, **values}
 
 
 def _peaks(results: Results, analysis: str) -> Iterator[Cells]:
-    """Largest absolute values of the most read quantities."""
     peaks = list[tuple[str, str, float]]()
     for target in targets(results, analysis):
         error = path_error(results, analysis, target)
@@ -80,7 +79,6 @@ def _peaks(results: Results, analysis: str) -> Iterator[Cells]:
 
 
 def _origins_table(files: Sequence[Results], studies: Sequence[tuple[Path, Study]]) -> Table:
-    """Files, hashes and versions that the page rests on."""
     rows = []
     for results, source in labelled(files):
         rows.append((source or results.name, "results", str(results.path), _sha256(results.path.read_bytes())))
@@ -168,9 +166,8 @@ def page_of(content: Mapping[str, Any]) -> str:
         from plotly.offline import get_plotlyjs, get_plotlyjs_version
     except ModuleNotFoundError as error:
         raise SolveError(f"a report needs {error.name}, which is not installed: pip install plotly jinja2") from None
-    files = FileSystemLoader(Path(__file__).parent)
     environment = Environment(
-        loader=files,
+        loader=FileSystemLoader(Path(__file__).parent),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -198,7 +195,6 @@ def _content(files: Sequence[Results], studies: Sequence[tuple[Path, Study]]) ->
 
 
 def _study_part(study: Study) -> dict[str, Any]:
-    """What the page shows of a study; its diagrams as SVG files in base64."""
     try:
         from ..studies.figures import svg_of
     except ModuleNotFoundError as error:

@@ -104,11 +104,11 @@ def _draw_band(axes: Axes, band: Band) -> None:
 
 
 def _draw_progress(axes: Axes, diagram: Progress) -> None:
-    number = np.arange(len(diagram.values))
-    values = floats(diagram.values)
+    values, states = floats(diagram.values), np.array(diagram.states)
+    number = np.arange(len(values))
     axes.plot(number, floats(diagram.best), color=COLORS[0], drawstyle="steps-post", label="best so far")
     for state, look in LOOKS.items():
-        mine = np.array([one == state for one in diagram.states])
+        mine = states == state
         marks: dict[str, Any] = {"color": look.color, "label": look.label}
         if state == "failed" and mine.any():  # at the lower edge
             edge = np.full(mine.sum(), 0.02)
@@ -141,8 +141,7 @@ def _draw_parallel(diagram: Parallel) -> Figure:
     lines = max(len(wrapped(axis.label, LETTERS)) for axis in diagram.axes)
     axes.set_title(diagram.title, loc="left", pad=8 + LINE * lines)
     axes.set_axis_off()
-    axes.set_xlim(-0.35, count - 0.75)
-    axes.set_ylim(-0.03, 1.03)
+    axes.set(xlim=(-0.35, count - 0.75), ylim=(-0.03, 1.03))
     places = np.column_stack([axis.places for axis in diagram.axes])
     for state, look in LOOKS.items():
         for row in (k for k, one in enumerate(diagram.states) if one == state):
@@ -189,17 +188,16 @@ def _ticks(axis: DesignAxis) -> list[tuple[float, str]]:
     """Round numbers within the axis, or the rows of a catalog, and their texts."""
     if axis.names:
         return [(float(k), name) for k, name in enumerate(axis.names)]
+    low, high = axis.low, axis.high
     locators: list[Locator] = [MaxNLocator(7, steps=[1, 2, 5, 10])]  # intervals of an axis at most
     if axis.logarithmic:
-        is_long = axis.high > 1e3 * axis.low
-        locators.insert(0, LogLocator(subs=[1.0] if is_long else [1.0, 2.0, 5.0]))
-    room = 1e-9 * (axis.high - axis.low)
-    inside = (
-        [x for x in locator.tick_values(axis.low, axis.high) if axis.low - room <= x <= axis.high + room]
-        for locator in locators
-    )
-    values = next((values for values in inside if len(values) > 1), [])
-    return [(float(x), f"{x:.6g}") for x in values]
+        locators.insert(0, LogLocator(subs=[1.0] if high > 1e3 * low else [1.0, 2.0, 5.0]))
+    room = 1e-9 * (high - low)
+    for locator in locators:
+        inside = [x for x in locator.tick_values(low, high) if low - room <= x <= high + room]
+        if len(inside) > 1:
+            return [(float(x), f"{x:.6g}") for x in inside]
+    return []
 
 
 def _beyond(sense: int) -> dict[str, Any]:

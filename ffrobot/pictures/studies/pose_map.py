@@ -52,8 +52,7 @@ def _lobes(pose_map: PoseMap) -> Iterator[tuple[str, Figure]]:
                 axes.axhline(least, color=color, linestyle=":", label=label)
                 label = ""
         axes.set_ylim(bottom=0.0)
-        axes.set_xlabel("spindle speed (rev/min)")
-        axes.set_ylabel("depth of cut (mm)")
+        axes.set(xlabel="spindle speed (rev/min)", ylabel="depth of cut (mm)")
         legend(axes)
         yield f"lobes_{condition}", figure
 
@@ -83,8 +82,7 @@ def _heat_map(axes: Axes, pose_map: PoseMap, quantity: Quantity, long: list[Grid
         place = np.unravel_index(number, pose_map.plan.shape)
         at = [values[k] for axis, values, k in zip(pose_map.plan.axes, grid, place, strict=True) if axis in long]
         axes.plot(*at, marker, color=color, markeredgecolor="white", markersize=7)
-    axes.set_xlabel(_label(long[0]))
-    axes.set_ylabel(_label(long[1]))
+    axes.set(xlabel=_label(long[0]), ylabel=_label(long[1]))
     if all(axis.is_place and axis.unit == "m" for axis in long):
         axes.set_aspect("equal")
 

@@ -110,7 +110,7 @@ def results_grid(results: Results, analysis: str, frames: Indices, notes: list[s
     """
     bodies = moving_bodies(results, analysis, frames)
     shapes = [surface_shape(results, body, notes) for body in bodies]
-    data = dict[str, list[Array]](deflection=[], exaggeration=[], von_mises=[])
+    parts = list[tuple[Array, Array, Array]]()
     for shape, body in zip(shapes, bodies, strict=True):
         deflection = shape.deflection
         stress = np.full(deflection.shape[:2], np.nan)
@@ -118,17 +118,17 @@ def results_grid(results: Results, analysis: str, frames: Indices, notes: list[s
             with suppress(InputError):  # a note where its surface is drawn
                 link = results.modal_body(body.name)
                 stress = von_mises(surface_stress(link, results.stress_recovery(analysis, body.name).at(frames)))
-        data["deflection"].append(deflection)
-        data["exaggeration"].append(deflection + body.shift[:, None])
-        data["von_mises"].append(stress)
-    if all(np.isnan(stress).all() for stress in data["von_mises"]):
+        parts.append((deflection, deflection + body.shift[:, None], stress))
+    joined = (np.concatenate(each, axis=1) for each in zip(*parts, strict=True))
+    data = dict(zip(("deflection", "exaggeration", "von_mises"), joined, strict=True))
+    if np.isnan(data["von_mises"]).all():
         del data["von_mises"]
     numbers = [body["name"] for body in results.scene["body"]]
     return Grid(
         cells=numbered_cells(shapes),
         points=np.concatenate([shape.placed() for shape in shapes], axis=1),
         time=results.time(analysis)[frames],
-        point_data={name: np.concatenate(parts, axis=1) for name, parts in data.items()},
+        point_data=data,
         cell_data={"body": np.repeat([numbers.index(b.name) for b in bodies], [len(s.cells) for s in shapes])},
     )
 
