@@ -102,23 +102,14 @@ class ShapeIntegrals:
 
     def transformed(self, T: Array) -> ShapeIntegrals:
         """Return the integrals in modal coordinates p (m,) with q = T p, T (n, m)."""
-        return replace(
-            self,
-            S_bar=self.S_bar @ T,
-            inertia_slope=self.inertia_slope @ T,
-            spin=self.spin @ T,
-            spin_slope=T.T @ self.spin_slope @ T,
-            modal_mass=T.T @ self.modal_mass @ T,
-            centrifugal_slope=T.T @ self.centrifugal_slope @ T,
-            stiffness=T.T @ self.stiffness @ T,
-            damping=T.T @ self.damping @ T,
-        )
+        linear = {key: getattr(self, key) @ T for key in ("S_bar", "inertia_slope", "spin")}
+        squares = ("spin_slope", "modal_mass", "centrifugal_slope", "stiffness", "damping")
+        return replace(self, **linear, **{key: T.T @ getattr(self, key) @ T for key in squares})
 
 
 def integrals_of(body: ModalBody) -> ShapeIntegrals:
     """Return the integrals of a modal body, including the inertia of sections about their axis."""
     spatial = from_modal_body(body.name, body)
-    spin_slope, centrifugal_slope = slopes(spatial.S_bar_kl)
     return ShapeIntegrals(
         mass=spatial.mass,
         first_moment=spatial.first_moment,
@@ -126,18 +117,18 @@ def integrals_of(body: ModalBody) -> ShapeIntegrals:
         inertia=spatial.inertia,
         inertia_slope=spatial.inertia_slope,
         spin=spatial.spin,
-        spin_slope=spin_slope,
         modal_mass=body.modal_mass,
-        centrifugal_slope=centrifugal_slope,
         stiffness=body.stiffness,
         damping=spatial.damping,
+        **slopes(spatial.S_bar_kl),
     )
 
 
-def slopes(S: Array) -> tuple[Array, Array]:
+def slopes(S: Array) -> dict[str, Array]:
     """Return `spin_slope` (3, n, n) and `centrifugal_slope` (6, n, n) of S (3, 3, n, n) = ∫ρ Φ_kᵀ Φ_l dV; no unit."""
     centrifugal = [S[a, a] - np.trace(S) if a == b else S[a, b] + S[b, a] for a, b in PAIRS]
-    return np.einsum("abc,bckl->alk", LEVI_CIVITA, S), np.array(centrifugal)
+    spin = np.einsum("abc,bckl->alk", LEVI_CIVITA, S)
+    return {"spin_slope": spin, "centrifugal_slope": np.array(centrifugal)}
 
 
 def _with_agreed_masses(integrals: ShapeIntegrals) -> tuple[ShapeIntegrals, tuple[str, ...]]:
@@ -145,10 +136,6 @@ def _with_agreed_masses(integrals: ShapeIntegrals) -> tuple[ShapeIntegrals, tupl
 
     In files of few digits M_e is off ∫ρΦᵀΦ of masses and shapes. Where nothing has inertia about the axis, so that no
     section can account for that, ∫ρΦᵀΦ is taken.
-
-    Raises:
-        InputError: M_e and ∫ρΦᵀΦ contradict each other there, or M_e is less than what the mean motion of the shapes
-            alone has, S̄ᵀS̄/m.
     """
     M, translational = integrals.modal_mass, integrals.translational_mass
     mean = np.sum(integrals.S_bar**2, axis=0) / integrals.mass

@@ -113,7 +113,6 @@ def read_fem(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
 
 
 def _records(text: str) -> dict[int, list[str]]:
-    """The words of each record; comments and titles left out."""
     records, current = dict[int, list[str]](), None
     for line in text.splitlines():
         if match := GROUP.match(line.strip()):
@@ -149,7 +148,7 @@ def _of_invariants(records: dict[int, list[str]], n: int) -> dict[str, Any]:
         "inertia_slope": inv8 + inv8.transpose(1, 0, 2),
         "spin": inv4,
         "spin_slope": inv5.transpose(0, 2, 1),
-        "centrifugal_slope": slopes(S)[1],
+        "centrifugal_slope": slopes(S)["centrifugal_slope"],
     }
 
 
@@ -164,7 +163,6 @@ def _of_lumped_masses(masses: Array, x: Array, shapes: Array) -> dict[str, Any]:
     second = np.einsum("i,ia,ib->ab", m, x, x)
     I_bar = np.einsum("i,ia,nib->abn", m, x, Phi)
     S = np.einsum("i,jia,kib->abjk", m, Phi, Phi)
-    spin_slope, centrifugal_slope = slopes(S)
     return {
         "mass": float(m.sum()),
         "first_moment": m @ x,
@@ -172,6 +170,5 @@ def _of_lumped_masses(masses: Array, x: Array, shapes: Array) -> dict[str, Any]:
         "inertia": np.trace(second) * np.eye(3) - second + np.diag(J.sum(axis=0)),
         "inertia_slope": 2 * np.trace(I_bar) * np.eye(3)[:, :, None] - I_bar - I_bar.transpose(1, 0, 2),
         "spin": np.einsum("abc,bcn->an", LEVI_CIVITA, I_bar) + np.einsum("ia,nia->an", J, turn),
-        "spin_slope": spin_slope,
-        "centrifugal_slope": centrifugal_slope,
+        **slopes(S),
     }
