@@ -108,8 +108,7 @@ def export_file(
     """
     if not path.exists():
         raise InputError(f"{path}: expected a scene, a modal body or a results file", "no such file")
-    is_scene = path.suffix.lower() == ".toml"
-    kind = "a scene" if is_scene else "a modal body" if is_modal_body_file(path) else "results"
+    kind = "a scene" if path.suffix.lower() == ".toml" else "a modal body" if is_modal_body_file(path) else "results"
     known = FORMATS[kind]
     check_known(file_format, known, f"{path}: --format: expected one of {quoted(known)} of {kind}")
     if analysis is not None and (kind == "a modal body" or file_format == "urdf"):

@@ -324,10 +324,8 @@ def _record(joints: Sequence[str], rows: Sequence[Row], velocities: Sequence[Any
     times = np.array([time for time, _ in rows])
     values = np.array([positions for _, positions in rows], dtype=float).reshape(len(rows), len(joints))
     try:
-        rates = np.array(velocities, dtype=float).reshape(values.shape)
+        rates = np.asarray_chkfinite(velocities, dtype=float).reshape(values.shape)
     except (TypeError, ValueError, OverflowError):
-        rates = None
-    if rates is not None and not np.isfinite(rates).all():
         rates = None
     sizes = np.abs(values[:0] if rates is None else rates)
     for k, end in ((0, "first"), (-1, "last")) if len(sizes) else ():
@@ -429,11 +427,11 @@ def _together(samples: Mapping[str, list[Sample]], remarks: list[str]) -> Record
     times = stamps[(stamps >= begin) & (stamps <= end)]
     if len(times) < 2:
         raise InputError("expected joints that are recorded at the same time", f"none for {quoted(series)}")
+    seconds = (times - times[0]) / NANO
     if apart:
-        whole = (times[-1] - times[0]) / NANO
         remarks.append(
             f"{quoted(map(shown, apart))}: in other messages: by cubic splines at times of the others, the"
-            f" {whole:.6g} s that all have"
+            f" {seconds[-1]:.6g} s that all have"
         )
     columns = list[Array]()
     for name, (at, values) in series.items():
@@ -442,6 +440,6 @@ def _together(samples: Mapping[str, list[Sample]], remarks: list[str]) -> Record
             continue
         once = np.append(True, np.diff(at) > 0)
         own = (at[once] - times[0]) / NANO
-        columns.append(scipy.interpolate.CubicSpline(own, values[once])((times - times[0]) / NANO))
-    table = np.stack([(times - times[0]) / NANO, *columns], axis=1)
-    return _record(list(series), [(row[0], row[1:]) for row in table.tolist()], [None], *remarks)
+        columns.append(scipy.interpolate.CubicSpline(own, values[once])(seconds))
+    points = zip(seconds.tolist(), np.stack(columns, axis=1).tolist(), strict=True)
+    return _record(list(series), list(points), [None], *remarks)

@@ -71,8 +71,7 @@ def draft_link(part: Inspection, file: Path, name: str, folder: Path, density: f
 
 def _material(density: float) -> tuple[dict[str, float], str]:
     name, E, nu, rho = min(MATERIALS, key=lambda one: abs(one[-1] / density - 1.0))
-    is_like = abs(rho / density - 1.0) < 0.1
-    other = "" if is_like else f", which is not the material of {density:g} kg/m3: replace it"
+    other = "" if abs(rho / density - 1.0) < 0.1 else f", which is not the material of {density:g} kg/m3: replace it"
     return {"youngs_modulus": E, "poissons_ratio": nu, "density": density}, f"# Stiffness of {name}{other}."
 
 
@@ -96,8 +95,11 @@ def _ends(part: Inspection) -> tuple[PartFace, PartFace]:
     if len(bores) > 1:
         first, *_, last = sorted(bores, key=lambda face: float(face.center @ along))
         return first, last
-    planes = [face for face in part.faces if face.kind == "plane"]
-    ends = [face for face in planes if ((part.points - face.point) @ face.direction).max() < AT_END * length]
+    ends = [
+        face
+        for face in part.faces
+        if face.kind == "plane" and ((part.points - face.point) @ face.direction).max() < AT_END * length
+    ]
     pairs = [
         ((tip.point - root.point) @ tip.direction, root, tip)
         for root in ends

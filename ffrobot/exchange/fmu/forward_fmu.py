@@ -55,7 +55,7 @@ def forward_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str
         folder, suffix = platform_here()
     prepared = prepare_scene(scene, _Logged())
     bodies = mode_levels(scene, prepared.bodies)[-1]  # "auto": all of them
-    model = with_compliance((with_bodies(prepared, bodies).model).without_paths())
+    model = with_compliance(with_bodies(prepared, bodies).model.without_paths())
     unit = _forward_unit(model, prepared, chosen, AXES[:2] if scene.is_planar else AXES)
     unit.data.guid = guid_of(unit.data.to_bytes().hex(), (*unit.inputs, *unit.outputs))
     identifier = identifier_of(scene.name, chosen.name)
@@ -83,8 +83,7 @@ def _chosen(scene: Scene, name: str | None) -> Forward:
     wanted = 'an analysis of kind "forward" without actuation, whose motors are the inputs of the FMU'
     if name is None:
         raise InputError(f"--analysis: expected {wanted}", "none")
-    kind = getattr(analyses[name], "kind", "?")
-    what = f'kind "{kind}"' + (" with actuation" if isinstance(analyses[name], Forward) else "")
+    what = f'kind "{analyses[name].kind}"' + (" with actuation" if isinstance(analyses[name], Forward) else "")
     raise InputError(f"--analysis: expected {wanted}", f'"{name}" of {what}')
 
 

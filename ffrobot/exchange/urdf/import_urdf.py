@@ -178,15 +178,14 @@ def import_urdf(
             about = f'link "{link.name}" is flexible: {link.file_name} determines its inertia, not its <inertial>'
             remarks += [about, *(f"{link.file_name}: {remark}" for remark in link.remarks)]
         payloads, about_rest = _compared(robot, links, scene, keep_rest=keep_rest)
-        keys = {**scene.keys, **({"payload": payloads} if payloads else {})}
+        keys = scene.keys | ({"payload": payloads} if payloads else {})
         remarks += [*about_rest, *about_meshes, *_remarks_on_scale(robot)]
         files = {SCENE: _scene_text(urdf, keys, remarks)}
         for link in links.values():
             axes = "x from the joint that carries it to the next, y in its plane of swing"
             head = _comment(f'Link "{link.name}" of {urdf.name}: {axes}.')
             files[link.file_name] = f"{head}\n\n{toml_text(link.keys)}"
-        written = _write(folder, files, force=force)
-        return Imported(robot, keys, tuple(remarks), masses, written)
+        return Imported(robot, keys, tuple(remarks), masses, _write(folder, files, force=force))
 
 
 def _compared(

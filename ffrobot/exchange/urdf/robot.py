@@ -37,6 +37,7 @@ def three(values: Iterable[float]) -> Numbers3:
 
 TYPES = ("revolute", "continuous", "prismatic", "planar", "floating", "fixed")
 """Types of joints that URDF has."""
+WITH_AXIS = TYPES[:4]
 
 
 @struct
@@ -82,9 +83,7 @@ class Inertial:
     def __add__(self, other: Inertial) -> Inertial:
         """Both together (parallel axes)."""
         mass = self.mass + other.mass
-        if mass == 0.0:
-            return Inertial(0.0, self.center, self.inertia + other.inertia)
-        center = (self.mass * self.center + other.mass * other.center) / mass
+        center = (self.mass * self.center + other.mass * other.center) / mass if mass else self.center
         inertia = self.inertia + other.inertia
         for part in (self, other):
             inertia = inertia + point_inertia(part.mass, part.center - center)
@@ -249,8 +248,9 @@ def read_urdf(path: Path) -> Robot:
         root = _root_element(read_bytes(path, "URDF file"))
         links = [_link(each) for each in root.findall("link")]
         joints = [_joint(each) for each in root.findall("joint")]
-        for kind, names in (("link", [link.name for link in links]), ("joint", [joint.name for joint in joints])):
-            if again := next((name for name, count in Counter(names).items() if count > 1), None):
+        for kind in ("link", "joint"):
+            counts = Counter(map(_name, root.findall(kind)))
+            if again := next((name for name, count in counts.items() if count > 1), None):
                 raise InputError(f"expected one <{kind}> of each name", f'several of the name "{shown(again)}"')
         by_name = {joint.name: joint for joint in joints}
         _check_mimics(by_name)
@@ -334,8 +334,11 @@ def _left_of(element: Element) -> Iterator[tuple[tuple[str, ...], str]]:
     """What is not read of an element and of those inside it: of which kind, and as it stands there."""
     # The other product of inertia of two counts only where it has another value.
     twin = {key: element.get(f"i{key[2]}{key[1]}") for key in ("iyx", "izx", "izy") if element.tag == "inertia"}
-    left = {key: value for key, value in element.items() if key not in READ[element.tag]}
-    left = {key: value for key, value in left.items() if not key.startswith("xmlns") and value != twin.get(key)}
+    left = {
+        key: value
+        for key, value in element.items()
+        if not (key in READ[element.tag] or key.startswith("xmlns") or value == twin.get(key))
+    }
     if left:
         words = " ".join(f'{shown(key)}="{shown(value)}"' for key, value in left.items())
         yield (element.tag, *left), f"<{element.tag} {words}>"
@@ -358,10 +361,14 @@ SIZES: Mapping[Shape, Mapping[str, int]] = {
 """Attributes of shapes with so many numbers each."""
 
 
+def _text(element: Element, key: str, label: str, default: str = "") -> str:
+    if not (text := element.get(key, default)):
+        raise InputError(f"{label}: expected the attribute {key}", "none")
+    return text
+
+
 def _name(element: Element) -> str:
-    if not (name := element.get("name", "")):
-        raise InputError(f"<{element.tag}>: expected the attribute name", "none")
-    return name
+    return _text(element, "name", f"<{element.tag}>")
 
 
 def _label(element: Element) -> str:
@@ -419,7 +426,7 @@ def _joint(element: Element) -> UrdfJoint:
     check_known(kind, TYPES, f"{label}: type: expected one of {quoted(TYPES)}")
     axis = element.find("axis")
     along = (1.0, 0.0, 0.0) if axis is None else three(_numbers(axis, "xyz", f"{label}: <axis>", "1 0 0"))
-    if not any(along) and kind in ("revolute", "continuous", "prismatic", "planar"):
+    if not any(along) and kind in WITH_AXIS:
         raise InputError(f"{label}: <axis>: expected a direction", "0 0 0")
     return UrdfJoint(
         name=_name(element),
@@ -444,8 +451,7 @@ def _end(joint: Element, kind: str, label: str) -> str:
 def _mimic(element: Element | None, label: str) -> Mimic | None:
     if element is None:
         return None
-    if not (name := element.get("joint", "")):
-        raise InputError(f"{label}: expected the attribute joint", "none")
+    name = _text(element, "joint", label)
     return Mimic(name, _number(element, "multiplier", label, "1"), _number(element, "offset", label, "0"))
 
 
@@ -474,10 +480,8 @@ def _origin(element: Element, label: str) -> Origin:
     return Origin(xyz, three(rpy_of(of_quaternion(e / size))))
 
 
-def _number(element: Element, key: str, label: str, default: str | None = None) -> float:
-    if (text := element.get(key, default)) is None:
-        raise InputError(f"{label}: expected the attribute {key}", "none")
-    return _finite(text, f"{label}: {key}")
+def _number(element: Element, key: str, label: str, default: str = "") -> float:
+    return _finite(_text(element, key, label, default), f"{label}: {key}")
 
 
 def _numbers(element: Element, key: str, label: str, default: str = "0 0 0") -> list[float]:
@@ -493,10 +497,8 @@ def _finite(text: str, label: str) -> float:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not math.isfinite(value):
-        raise InputError(f"{label}: expected a finite number", f'"{shown(text)}"')
-    if abs(value) > LARGEST:
-        raise InputError(f"{label}: expected a number between -{LARGEST:g} and {LARGEST:g}", f"{value:g}")
+    if not abs(value) <= LARGEST:  # False of NaN
+        raise InputError(f"{label}: expected a finite number up to {LARGEST:g}", f'"{shown(text)}"')
     return value
 
 

@@ -13,7 +13,20 @@ from ...common.tables import shown
 from ...mbs.fields.field_types import GROUND
 from ...mbs.scene.bodies import ROUND_OFF, check_inertia
 from .flexible import ImportedLink
-from .robot import HERE, MASSLESS, Inertial, MeshFile, Names, Origin, Place, Primitive, Robot, UrdfJoint, three
+from .robot import (
+    HERE,
+    MASSLESS,
+    WITH_AXIS,
+    Inertial,
+    MeshFile,
+    Names,
+    Origin,
+    Place,
+    Primitive,
+    Robot,
+    UrdfJoint,
+    three,
+)
 
 
 @dataclass(eq=False)
@@ -148,27 +161,20 @@ def _wrong_inertias(bodies: list[MergedLinks]) -> Iterator[str]:
     for body in bodies:
         if body.flexible:
             continue
+        J = body.inertial.inertia
         try:
-            xx, yy, zz = (tuple(row) for row in body.inertial.inertia.tolist())
+            xx, yy, zz = map(three, J)
             check_inertia((xx, yy, zz))
         except ValueError as error:
-            least, _, largest = np.linalg.eigvalsh(least_change(body.inertial.inertia))
-            is_mended = not is_possible(body.inertial.inertia) and least >= -ROUND_OFF * largest
+            least, _, largest = np.linalg.eigvalsh(least_change(J))
+            is_mended = not is_possible(J) and least >= -ROUND_OFF * largest
             way = ": --fix-inertia makes the least change" if is_mended else ""
             yield f"{body.label}: <inertia>: {error}{way}"
 
 
 GRAVITY = [0.0, 0.0, -9.81]
-SCENE_TYPE = {
-    "revolute": "revolute",
-    "continuous": "revolute",
-    "prismatic": "prismatic",
-    "planar": "planar",
-    "floating": "free",
-    "fixed": "weld",
-}
-WITH_AXIS = ("revolute", "continuous", "prismatic", "planar")
-SINGLE = ("revolute", "continuous", "prismatic")  # types with one coordinate
+SCENE_TYPE = {"continuous": "revolute", "floating": "free", "fixed": "weld"}  # others have the same name
+SINGLE = WITH_AXIS[:3]  # types with one coordinate
 ORIGIN = "origin"  # point of a rigid body where the joint that carries it is
 
 
@@ -275,7 +281,7 @@ class SceneOfRobot:
     def _joint(self, joint: UrdfJoint) -> dict[str, Any]:
         parent, child = (self.body_of[link] for link in (joint.parent, joint.child))
         place = parent.members[joint.parent] @ joint.origin.place
-        keys: dict[str, Any] = {"name": self.joints[joint.name], "type": SCENE_TYPE[joint.type]}
+        keys: dict[str, Any] = {"name": self.joints[joint.name], "type": SCENE_TYPE.get(joint.type, joint.type)}
         keys["between"] = [GROUND, f"{self.bodies[child.top]}.{'root' if child.flexible else ORIGIN}"]
         if not parent.stands_still:
             name, top = joint.name, parent.top
@@ -319,19 +325,17 @@ class SceneOfRobot:
     def _remark_on_mimic(self, joint: UrdfJoint) -> None:
         if (mimic := joint.mimic) is None:
             return
-        leader, follows = self.robot.joints[mimic.joint], f'{joint.label} follows "{shown(mimic.joint)}"'
+        leader = self.robot.joints[mimic.joint]
         if leader.type == "fixed":
-            self.remarks.append(
-                f"{follows}, which is fixed: its position is {mimic.offset:g}; give it a trajectory of that value"
-            )
+            means = f", which is fixed: its position is {mimic.offset:g}; give it a trajectory of that value"
         elif leader not in self.carrying:
-            self.remarks.append(f"{follows}, which is left out: give it its own trajectory")
+            means = ", which is left out: give it its own trajectory"
         else:
-            self.remarks.append(
-                f"{follows}: give it a separate trajectory, {mimic.multiplier:g} times that one plus {mimic.offset:g};"
-                f" the motor of that one then has to supply {mimic.multiplier:g} times this one's torque in addition to"
-                " its own"
+            means = (
+                f": give it a separate trajectory, {mimic.multiplier:g} times that one plus {mimic.offset:g}; the motor"
+                f" of that one then has to supply {mimic.multiplier:g} times this one's torque in addition to its own"
             )
+        self.remarks.append(f'{joint.label} follows "{shown(mimic.joint)}"{means}')
 
     def _friction(self, joint: UrdfJoint) -> dict[str, Any]:
         keys: dict[str, Any] = {}

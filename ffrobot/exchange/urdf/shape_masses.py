@@ -84,7 +84,7 @@ def mesh_path(filename: str, urdf: Path) -> Path | None:
 
 
 def _loaded(mesh: MeshFile, urdf: Path) -> trimesh.Trimesh:
-    """The mesh in the axes of its link, m; raises as `loaded_skin` does."""
+    """The mesh in the axes of its link, m."""
     place, path = mesh.origin.place, mesh_path(mesh.filename, urdf)
     assert path is not None
     return loaded_skin(path, mesh.scale, place.d, place.C)
