@@ -14,7 +14,7 @@ import numpy as np
 from ..common.arrays import Array
 from ..common.errors import InputError, did_you_mean
 from ..common.peaks import root_mean_square, top_at
-from ..results.file import COLUMN, Results
+from ..results.file import Results, dataset_and_column
 from ..results.joints import unit_of
 from ..results.peaks import MEAN_POWER, RMS_POWER
 from ..results.peaks import POWER as PEAK_POWER
@@ -146,8 +146,7 @@ def read_history(results: Results, name: str, option: str) -> History:
 
     Raises `InputError`, with the `option` that names it, where there is none.
     """
-    match = COLUMN.fullmatch(name)
-    wanted = match["dataset"] if match else name
+    wanted, k = dataset_and_column(name)
     datasets = _known(results)
     dataset = datasets.get(wanted.replace("/", "."))
     if dataset is None:
@@ -162,8 +161,7 @@ def read_history(results: Results, name: str, option: str) -> History:
     names = (PEAK_POWER, RMS_POWER, MEAN_POWER) if is_power else ("peak", "rms", "mean")
     sizes = [np.atleast_1d(about.get(key, np.nan)) for key in names]
     time, in_doubt = results.time(dataset), False
-    if match:
-        k = int(match["column"])
+    if k is not None:
         if k >= values.shape[1]:
             raise InputError(f'{option}: expected a column below {values.shape[1]} of "{wanted}"', k)
         if len(sizes[1]) < values.shape[1]:  # those of a vector's length

@@ -54,7 +54,12 @@ def status_in_words(attributes: Mapping[str, Any]) -> str:
 
 
 NUMBER = re.compile(r"(\d+)")
-COLUMN = re.compile(r"(?P<dataset>.*?)\[(?P<column>\d+)\]")
+
+
+def dataset_and_column(name: str) -> tuple[str, int | None]:
+    """Split `name[k]` into dataset and number of its column, which is None where only the dataset is named."""
+    match = re.fullmatch(r"(.*?)\[(\d+)\]", name)
+    return (match[1], int(match[2])) if match else (name, None)
 
 
 class _Attributes(dict[str, Any]):
@@ -81,6 +86,7 @@ class Results:
 
     def __init__(self, path: PathLike[str] | str, *, image: bytes | None = None) -> None:
         self.path, self._in_memory, self.asked = Path(path), image is not None, set[str]()
+        self._histories = dict[str, list[str]]()
         try:
             # not as a file of Python's: HDF5 closes what is left open at the end, when Python is no more
             self._file = open_checked(self.path) if image is None else h5py.File(h5py.h5f.open_file_image(image), "r")
@@ -112,7 +118,6 @@ class Results:
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        """The verdict, as notebooks show it."""
         from html import escape
 
         if not self._file:
@@ -174,16 +179,15 @@ class Results:
 
     def histories(self, analysis: str) -> list[str]:
         """Names of the histories of an analysis: datasets over its outputs."""
-        known: dict[str, list[str]] = self.__dict__.setdefault("_histories", {})  # a walk through a file takes ms
-        if analysis not in known:
-            names, outputs = known.setdefault(analysis, []), len(self.time(analysis))
+        if analysis not in self._histories:  # a walk through a file takes ms
+            names, outputs = self._histories.setdefault(analysis, []), len(self.time(analysis))
 
             def collect(name: str, item: h5py.Dataset | h5py.Group) -> None:
                 if isinstance(item, h5py.Dataset) and item.shape[:1] == (outputs,) and not name.startswith("resume/"):
                     names.append(name)
 
             self._file[analysis].visititems(collect)
-        return list(known[analysis])
+        return list(self._histories[analysis])
 
     def columns(self, analysis: str) -> dict[str, Array]:
         """All histories of an analysis, one (T,) array in SI units each.
@@ -338,7 +342,6 @@ class Results:
         return [name for name in names if "/resume/" not in name]
 
     def _ipython_key_completions_(self) -> list[str]:
-        """What an interactive session offers behind `results["`."""
         return self.keys()
 
     def __contains__(self, dataset: object) -> bool:
@@ -427,13 +430,11 @@ class Results:
 
     def data(self, name: str) -> Array:
         """A dataset in SI units as (T, columns), or one column, `name[k]`, as (T, 1). Raises `InputError` if absent."""
-        match = COLUMN.fullmatch(name)
-        dataset = match["dataset"] if match else name
+        dataset, k = dataset_and_column(name)
         values = self[dataset]
         values = values.reshape(len(values), -1)
-        if match is None:
+        if k is None:
             return values
-        k = int(match["column"])
         if k >= values.shape[1]:
             raise InputError(f'{self.path}: expected column {k} of "{dataset}"', f"{values.shape[1]} columns")
         return values[:, k : k + 1]
@@ -445,10 +446,9 @@ class Results:
         """
         from .peaks import peak_of
 
-        match = COLUMN.fullmatch(name)
-        dataset = match["dataset"] if match else name
+        dataset, column = dataset_and_column(name)
         self[dataset]  # raises where there is none
-        return peak_of(self._file[dataset], self.time(dataset), int(match["column"]) if match else None)
+        return peak_of(self._file[dataset], self.time(dataset), column)
 
     def _near(self, dataset: str) -> str:
         known: list[str] = []

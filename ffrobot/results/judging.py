@@ -26,7 +26,6 @@ SAME_TIME = 9  # digits of output times (s) that count
 
 
 def _is_controlled(group: h5py.Group) -> bool:
-    """Whether a controller keeps an analysis on its path."""
     return bool(group.attrs["kind"] == "closed-loop")
 
 
@@ -37,15 +36,16 @@ def write_off_path(group: h5py.Group, solution: Solution, result: AnalysisResult
         return
     of, last = group.parent[source], solution.analyses[source].analysis.last_time
     both = (run.time >= of["time"][0]) & (run.time <= of["time"][-1] * (1.0 + SAME))
-    inside = np.clip(run.time[both], 0.0, last)
+    time = run.time[both]
+    inside = np.clip(time, 0.0, last)
     for trajectory in run.model.scene.trajectory:
         if f"trajectories/{trajectory.name}/target" in of and trajectory.point is not None and trajectory.components:
             position = section_motion(run, trajectory.point).r[both]
             off = [position[:, "xyz".index(axis)] - f.sample(inside)[0] for axis, f in trajectory.components.items()]
             distance = np.linalg.norm(off, axis=0)
             entry = group.create_group(f"off_path/{trajectory.name}")
-            entry.attrs["point"], entry.attrs["distance"] = trajectory.point, largest(run.time[both], distance)[0]
-            entry.attrs["distance_rms"] = root_mean_square(run.time[both], distance)
+            entry.attrs.update(point=trajectory.point, distance=largest(time, distance)[0])
+            entry.attrs["distance_rms"] = root_mean_square(time, distance)
 
 
 def tool_error(group: h5py.Group, scene: Scene, *, feasible: bool | None) -> ToolError:
@@ -244,11 +244,8 @@ def _ended_early(group: h5py.Group) -> bool:
 
 def _deflection(group: h5py.Group) -> Place | None:
     time = group["time"][()]
-    places = [
-        _peak(point["deflection"], name, time)
-        for name, point in group.get("points", {}).items()
-        if "deflection" in point
-    ]
+    points = group.get("points", {}).items()
+    places = (_peak(point["deflection"], name, time) for name, point in points if "deflection" in point)
     return max((place for place in places if place[0] > 0.0), default=None)
 
 

@@ -203,14 +203,18 @@ def read_controllers(file: h5py.File, analysis: str) -> tuple[SampledController,
     from ..actuation.control.linear_model import SampledController
 
     group, time = file[f"{analysis}/control/controller"], file[f"{analysis}/control/time"]
-    inputs, outputs = tuple(group.attrs["inputs"]), tuple(group.attrs["outputs"])
-    step = float((time[-1] - time[0]) / (len(time) - 1))
-    states = tuple(f"state/{k}" for k in range(1, group["A"].shape[-1] + 1))
     times = group["time"][()] if "time" in group else time[:1]
     along = (np.reshape(group[key], (len(times), *group[key].shape[-2:])) for key in "ABCD")
-    names: dict[str, Any] = {"state_names": states, "input_names": inputs, "output_names": outputs, "sample_time": step}
-    matrices = (dict(zip("ABCD", of, strict=True)) for of in zip(*along, strict=True))
-    return tuple(SampledController(**names | of, time=float(t)) for of, t in zip(matrices, times, strict=True))
+    common: dict[str, Any] = {
+        "state_names": tuple(f"state/{k}" for k in range(1, group["A"].shape[-1] + 1)),
+        "input_names": tuple(group.attrs["inputs"]),
+        "output_names": tuple(group.attrs["outputs"]),
+        "sample_time": float((time[-1] - time[0]) / (len(time) - 1)),
+    }
+    return tuple(
+        SampledController(**common | dict(zip("ABCD", matrices, strict=True)), time=float(t))
+        for t, *matrices in zip(times, *along, strict=True)
+    )
 
 
 def read_linear(file: h5py.File, analysis: str) -> tuple[LinearModel, ...]:
@@ -219,11 +223,10 @@ def read_linear(file: h5py.File, analysis: str) -> tuple[LinearModel, ...]:
 
     group, time = file[f"{analysis}/linear"], file[f"{analysis}/time"][()]
     names: dict[str, Any] = {key: tuple(str(name) for name in group.attrs[key]) for key in NAMES}
-    models = []
-    for k, t in enumerate(time):
-        matrices = {key: np.asarray(group[key][k], dtype=float) for key in MATRICES}
-        models.append(LinearModel(**names | matrices, time=float(t)))
-    return tuple(models)
+    return tuple(
+        LinearModel(**names | {key: np.asarray(group[key][k], dtype=float) for key in MATRICES}, time=float(t))
+        for k, t in enumerate(time)
+    )
 
 
 def save_models(models: Sequence[StateSpace], path: Path) -> None:

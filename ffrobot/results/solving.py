@@ -112,7 +112,6 @@ def check_same_input(scene: Scene, bodies: Mapping[str, LoadedBody], file: Resul
 
 
 def _changes(scene: Scene, bodies: Mapping[str, LoadedBody], file: Results) -> Iterator[str]:
-    """What of the input is not that of the results file."""
     if file.ffrobot_version != VERSION:
         yield f"ffrobot {file.ffrobot_version}, now {VERSION},"
     if checksum.state(file.path) != "sound":  # the core looks at nothing that it is given

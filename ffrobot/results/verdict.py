@@ -208,7 +208,6 @@ def motor_texts(motor: MotorFeasibility, unit: str) -> tuple[str, str, str, str]
 
 
 def _of_limit(peak: float, limit: float) -> str:
-    """A peak, and the limit where there is one."""
     return number(peak) + (f" of {limit:g}" if np.isfinite(limit) else "")
 
 

@@ -84,7 +84,6 @@ def results_image(solution: Solution) -> bytes:
 
 
 def _write_head(file: h5py.File, solution: Solution) -> None:
-    """What every results file says of itself, of the scene, and of the files of modal bodies."""
     scene = solution.scene
     file.attrs.update({MARK: CHECKSUM, "format": FORMAT, "format_version": 1, "ffrobot_version": VERSION})
     file.attrs.update(name=scene.name, scene=scene.text, space=scene.space)
@@ -113,8 +112,9 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
         _write_points(group, result)
     if wants("feasibility") and result.actuation is not None:
         _write_feasibility(group, solution, result.actuation.feasibility)
-    for name, effect in ((name, body.structure) for name, body in solution.bodies.items() if body.structure):
-        write_record(group.create_group(f"patch_structure/{name}"), effect)
+    for name, body in solution.bodies.items():
+        if body.structure:
+            write_record(group.create_group(f"patch_structure/{name}"), body.structure)
     for point, settled in result.settling.items() if wants("settling") else ():
         write_record(group.create_group(f"settling/{point}"), settled)
     if (left := result.deviations) is not None:
@@ -131,7 +131,6 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
 
 
 def _write_balances(group: h5py.Group, result: AnalysisResult) -> None:
-    """Of an analysis: energy/, momentum/ and how well constraints are kept."""
     run, (energies, momentum) = result.run, result.totals
     write_record(group.create_group("energy"), energies)
     group["momentum/linear"] = run.space.along(momentum.linear)
@@ -181,7 +180,6 @@ def _write_voltages(group: h5py.Group, solution: Solution, actuation: Actuation)
 
 
 def _write_feasibility(group: h5py.Group, solution: Solution, judged: Feasibility) -> None:
-    """Write feasibility/ of an analysis: what is required of each motor and layout, against what they can."""
     group = group.create_group("feasibility")
     group.attrs["feasible"] = judged.is_feasible
     if judged.unsupplied is not None:
@@ -202,7 +200,6 @@ def _write_feasibility(group: h5py.Group, solution: Solution, judged: Feasibilit
 
 
 def _write_point_forces(group: h5py.Group, points: PointSet, forces: PointForces, space: Space) -> None:
-    """Write position, direction and residual of the actuation points of a body, in axes of the scene's `space`."""
     group["residual"] = forces.residual
     group["residual_force"] = forces.unmet
     group["position"] = space.along(np.array([point.position for point in points.points]))
@@ -257,32 +254,30 @@ def _write_bodies(group: h5py.Group, solution: Solution, result: AnalysisResult)
     run, histories = result.run, result.histories
     forces = actuator_forces(histories.run)
     for name in reported_points(run):
-        body, moved = solution.bodies[name].spatial, body_motion(run, name)
-        F_p, T = None if forces is None else forces.modal[name][histories.outputs], body.modal_transform
-        modes = {"modal": moved.modal, "modal_velocity": moved.modal_velocity}
+        entry, body, moved = group.create_group(f"bodies/{name}"), solution.bodies[name].spatial, body_motion(run, name)
+        force = {} if forces is None else {"modal_force": forces.modal[name][histories.outputs]}
+        T, modes = body.modal_transform, {"modal": moved.modal, "modal_velocity": moved.modal_velocity}
         about = "modes of the modal body file"
         if run.space.is_plane and T.shape[1] < T.shape[0]:  # of those that move in the plane
-            group[f"bodies/{name}/modal_transform"] = T
+            entry["modal_transform"] = T
             about = "modes of the modal body file are modal_transform times these"
             modes = {key: np.linalg.lstsq(T, values.T, rcond=None)[0].T for key, values in modes.items()}
-            F_p = None if F_p is None else F_p @ T
+            force = {key: F_p @ T for key, F_p in force.items()}
         turned = {"angle": plane_angle(run, name)} if run.space.is_plane else {"quaternion": moved.orientation}
         of_frame = {"position": run.space.along(moved.position), "velocity": run.space.along(moved.velocity)}
         of_frame["angular_velocity"] = run.space.about(moved.angular_velocity)
-        for key, values in (of_frame | turned | modes).items():
-            group[f"bodies/{name}/{key}"] = values
-        if F_p is not None:
-            group[f"bodies/{name}/modal_force"] = F_p
+        for key, values in (of_frame | turned | modes | force).items():
+            entry[key] = values
         if run.space.is_plane or name in solution.links:
-            group[f"bodies/{name}"].attrs.update({"modal_coordinates": about, "modes_kept": modes_kept(body)})
+            entry.attrs.update(modal_coordinates=about, modes_kept=modes_kept(body))
         if name in solution.divided:
-            group[f"bodies/{name}"].attrs["pieces"] = len(solution.divided[name].names)
+            entry.attrs["pieces"] = len(solution.divided[name].names)
     for name, link in result.bending.items():
-        about = group[f"bodies/{name}"].attrs
-        about.update(largest_deflection=link.deflection, largest_rotation=link.rotation)
-        about.update(position_error=link.missing.of_length, relative_error=link.missing.of_deflections)
+        attributes = group[f"bodies/{name}"].attrs
+        attributes.update(largest_deflection=link.deflection, largest_rotation=link.rotation)
+        attributes.update(position_error=link.missing.of_length, relative_error=link.missing.of_deflections)
         for key in ("foreshortening", "foreshortening_moment", "stiffness_change"):
-            about[key] = getattr(link, key)
+            attributes[key] = getattr(link, key)
 
 
 def _write_points(group: h5py.Group, result: AnalysisResult) -> None:
@@ -299,7 +294,6 @@ def _write_points(group: h5py.Group, result: AnalysisResult) -> None:
 
 
 def _write_stress(group: h5py.Group, stress: BodyStress, outputs: Indices) -> None:
-    """Write stresses of a body at stress points and on its surface at `outputs`, and the data for them."""
     recovery = stress.recovery.at(outputs)
     group.attrs["method"] = recovery.method
     group["modal"] = recovery.modal
