@@ -98,10 +98,7 @@ def given_voltages(scene: Scene, model: Model, patches: Mapping[str, LinkPatches
 
 
 def _straight(key: str, analyses: Sequence[Analysis], voltage: Sequence[TimeFunction]) -> tuple[Array, Array]:
-    """Times (T,), s, of all analyses, and voltages (T, k), V, which are straight in between but for a few jumps.
-
-    Raises `InputError` for voltages that turn too often for their time.
-    """
+    """Times (T,), s, of all analyses, and voltages (T, k), V, which are straight in between but for a few jumps."""
     first = min((float(analysis.times[0]) for analysis in analyses), default=0.0)
     last = max((analysis.last_time for analysis in analyses), default=0.0)
     last = last if last > first else first + 1.0
@@ -144,5 +141,4 @@ def find_actuation(scene: Scene, run: Run, bodies: Bodies, patches: Mapping[str,
     applied = {getattr(one, "apply", None) for one in scene.analysis if one.source == analysis.name}
     if analysis.supplies_all or applied & {"trajectory", "points"}:  # forces there need no modal forces
         others |= links.keys()
-    judged = judge_actuators(scene.path, run, links, patches, voltages, others)
-    return Actuation(voltages, unmet, judged)
+    return Actuation(voltages, unmet, judge_actuators(scene.path, run, links, patches, voltages, others))

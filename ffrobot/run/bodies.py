@@ -81,7 +81,7 @@ P = TypeVar("P", Payload, Tool)
 def _records_on(
     kind: str, records: Iterable[P], body: str, points: Collection[str], scene: Path
 ) -> Iterator[tuple[str, P]]:
-    """Payloads or tools (`kind`) of a body with their points. Raises `InputError` for points that it lacks."""
+    """Payloads or tools (`kind`) of a body with their points."""
     for record in records:
         name, point = split_point(record.point)
         if name != body:

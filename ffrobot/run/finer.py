@@ -51,10 +51,7 @@ def with_finer_check(solution: Solution, watcher: Watcher) -> Solution:
 
 
 def _finer_scene(solution: Solution) -> Scene:
-    """The scene with twice the eigenmodes of each link, of whose patches only the modal forces per volt are asked.
-
-    Raises `InputError` for a body whose link is not known, only its modal body file.
-    """
+    """The scene with twice the eigenmodes of each link, of whose patches only the modal forces per volt are asked."""
     scene, bodies = solution.scene, []
     for body in scene.body:
         modal = solution.links.get(body.name)

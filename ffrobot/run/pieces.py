@@ -124,7 +124,7 @@ def make_whole_links(prepared: Prepared) -> WholeLinks | None:
 def _as_links(whole: Model, divided: Mapping[str, DividedLink], run: Run) -> Run:
     """A run of the pieces in the coordinates of the robot with whole links: those of joints, and the nearest shapes.
 
-    Its multipliers and what drives it stay behind. Raises `InputError` for joints that have no coordinates there.
+    Its multipliers and what drives it stay behind.
     """
     tree = run.model.tree
     q = np.zeros((len(run.time), whole.tree.n_q))

@@ -90,18 +90,15 @@ class Prepared:
     @property
     def link_notes(self) -> tuple[str, ...]:
         """Notes on motions that links cannot perform, and on their meshes, one line each."""
+        reasons = {"rigid_in": "its file has no modes", "without_coordinate": "its equations keep none of the modes"}
         rigid = (
-            f"{name}: rigid in {', '.join(body.rigid_in)}, of which its file has no modes"
+            f"{name}: rigid in {', '.join(motions)}, of which {reason}"
+            for key, reason in reasons.items()
             for name, body in self.bodies.items()
-            if body.rigid_in
-        )
-        unkept = (
-            f"{name}: rigid in {', '.join(body.without_coordinate)}, of which its equations keep none of the modes"
-            for name, body in self.bodies.items()
-            if body.without_coordinate
+            if (motions := getattr(body, key))
         )
         remarks = (f"{name}: {text}" for name, modal in self.links.items() for text in modal.remarks)
-        return (*rigid, *unkept, *remarks, *self._off_axis())
+        return (*rigid, *remarks, *self._off_axis())
 
     def _off_axis(self) -> Iterator[str]:
         """Patches without a face on links whose faces are not at equal distances from the axis."""
@@ -168,8 +165,7 @@ def omissions(scene: Scene, bodies: Mapping[str, LoadedBody]) -> Iterator[str]:
 
 def _modes(name: str, body: Body, modal: ModalBody) -> Iterator[str]:
     """Modes that do not move in the plane, and those left out by choice."""
-    whole = body if body.reduction is None else body.reduction.whole
-    idle = np.flatnonzero(~whole.modal_transform.any(axis=1))
+    idle = np.flatnonzero(~body.whole.modal_transform.any(axis=1))
     if idle.size:
         families = Counter(modal.family[k] for k in idle)
         named = ", ".join(f"{count} {family}" for family, count in families.items())

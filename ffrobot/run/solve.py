@@ -85,7 +85,6 @@ def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None)
 
 
 def _with_deviations(solution: Solution, interruption: Interruption) -> Solution:
-    """The solution with the robustness tables that its analyses ask for, of completed motions."""
     results, failure = dict(solution.analyses), solution.failure
     for name, result in solution.analyses.items():
         if getattr(result.analysis, "robustness", None) is None or result.status != "completed":
@@ -103,7 +102,6 @@ def _with_deviations(solution: Solution, interruption: Interruption) -> Solution
 
 
 def _with_enough_modes(solution: Solution, interruption: Interruption) -> Solution:
-    """The scene solved with as many modes as its tolerances need."""
     search = ModeSearch(solution.scene, solution.bodies)
     while True:
         solution = _completed(with_bodies(solution, search.bodies), interruption)
@@ -148,8 +146,7 @@ def _judged(solution: Solution, interruption: Interruption, trial: Scene) -> Fea
 
 def _completed(solution: Solution, interruption: Interruption) -> Solution:
     """All analyses run; all of them again with geometric stiffening where its "auto" finds that they need it."""
-    completed = _run_all(solution, interruption)
-    completed = completed or _run_all(unsolved(replace(solution, stiffened=True)), interruption)
+    completed = _run_all(solution, interruption) or _run_all(unsolved(replace(solution, stiffened=True)), interruption)
     assert completed is not None
     return completed
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
-from types import FrameType, TracebackType
+from types import FrameType
 
 from ..common.interrupts import SIGNALS, EndOfCommand
 
@@ -51,7 +51,7 @@ class Interruption:
                     self._request(handler.number, None)
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
+    def __exit__(self, *error: object) -> None:
         if self._is_main:
             self._restore()
 
