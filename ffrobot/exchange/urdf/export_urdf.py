@@ -99,10 +99,11 @@ def _of_keys(tree: KinematicTree, size: float) -> Iterator[str]:
     range_of = f"a range of ±{size:.4g} m, the size of the robot: URDF wants one, the scene has none"
     of = dict[str, list[str]]()
     for joint in (node.joint for node in tree.nodes):
-        is_sliding, keys = joint.type in ("prismatic", "cylindrical"), joint.model_fields_set
-        is_planar = len(joint.units) > 2 and (joint.motor_limits or joint.frictions)
+        steps, keys = STEPS[joint.type], joint.model_fields_set
+        slides = [step.coordinate for step in steps if step.type == "prismatic" and step.coordinate >= 0]
+        is_planar = steps[0].type == "planar" and (joint.motor_limits or joint.frictions)
         for text, holds in {
-            range_of: is_sliding and np.isinf(joint.position_limits[-1]).any(),
+            range_of: any(np.isinf(joint.position_limits[slide]).any() for slide in slides),
             "rotor_inertia and compliance of gears left out": getattr(joint, "rotor_inertia", 0.0),
             "power_limit left out": any(np.isfinite(each.power) for each in joint.motor_limits),
             "friction_speed left out": "friction_speed" in keys,
