@@ -369,11 +369,6 @@ class Zeros:
         """Whether there is no zero with positive real part."""
         return not self.unstable.size
 
-    @property
-    def slowest(self) -> float:
-        """The size of the slowest zero with positive real part, rad/s; infinite where there is none."""
-        return float(np.abs(self.unstable).min(initial=np.inf))
-
     def describe(self) -> str:
         """Return number and slowest unstable zero as text."""
         if self.minimum_phase:

@@ -122,7 +122,7 @@ def _modes(
     """Eigenmodes, or what stands for them, and attachment modes; interfaces are at the stations `places`."""
     is_fixed = link.reference.condition == "craig-bampton"
     flexibility = {family: _flexibility(model, places if is_fixed else ()) for family, model in models.items()}
-    wanted = None if link.modes.are_default else _wanted(link, sum(one.rank for one in flexibility.values()), path)
+    wanted = _wanted(link, sum(one.rank for one in flexibility.values()), path)
     modes = list[Mode]()
     for family, model in models.items():
         count = min(wanted[-1] if wanted else DEFAULT_COUNT[family], flexibility[family].rank)
@@ -178,9 +178,9 @@ def _element_boundaries(link: BeamLink) -> Array:
 
 
 def _wanted(link: BeamLink, available: int, path: Path) -> Sequence[int]:
-    """Numbers of the modes asked for, from 1, ascending."""
+    """Numbers of the modes asked for, from 1, ascending; none where the program selects their number."""
     wanted = link.modes.indices or range(1, (link.modes.count or 0) + 1)
-    if wanted[-1] > available:
+    if wanted and wanted[-1] > available:
         key = "count" if link.modes.indices is None else "indices"
         raise InputError(
             f"{path}: modes.{key}: expected at most {available}, the number of modes available in family"

@@ -135,11 +135,6 @@ class Modes(Record):
     solver: Solver = "slepc"
     """Solver of the eigenproblem: SLEPc's Krylov–Schur or, of solids, block Lanczos, faster for fine meshes."""
 
-    @property
-    def are_default(self) -> bool:
-        """Whether the program selects their number."""
-        return self.count is None and self.indices is None
-
 
 class Damping(Record):
     """Modal damping ratios: one for all modes or one each, or ζ = a/(2ω) + bω/2 of D = aM + bK.

@@ -17,6 +17,7 @@ from ..mbs.linear.joint_conditions import translational_stiffness
 from ..mbs.model.body import Body
 from ..mbs.model.truncation import modes_kept
 from ..mbs.quantities.validity import deflection_warning
+from ..mbs.run.integrators import ASKED_FOR
 from ..mbs.run.record import Details, Run
 from ..results.file import Results
 from ..results.tables import Cells, analysis_cells, loop_cells, placement_cells, settling_cells, voltage_cells
@@ -84,7 +85,7 @@ def _notes(solution: Solution) -> Iterator[tuple[str, str]]:
     runs = {result.analysis.name: result.run for result in integrated(solution)}
     yield from (("path", note) for note in folded(solution.path_notes))
     chosen = ((name, run.statistics.integrator) for name, run in runs.items())
-    said = alike((name, f"{one.in_words}; {one.reason}") for name, one in chosen if one.is_automatic)
+    said = alike((name, f"{one.in_words}; {one.reason}") for name, one in chosen if one.reason != ASKED_FOR)
     yield from (("integrator", line) for line in said)
     for name, run in runs.items():
         if isinstance(run.details, AroundPath) and run.details.inversion is not None:
@@ -216,7 +217,9 @@ def _of_linear(name: str, linear: LinearModels) -> Iterator[str]:
         pair: next((zeros for zeros in known if not zeros.minimum_phase), known[0])
         for pair, known in linear.zeros.items()
     }
-    alone = sorted((pair for pair in worst if len(pair) == 2), key=lambda pair: worst[pair].slowest)
+    alone = sorted(
+        (pair for pair in worst if len(pair) == 2), key=lambda pair: np.abs(worst[pair].unstable).min(initial=np.inf)
+    )
     shown = [pair for pair in worst if len(pair) > 2 or pair in alone[:TRANSFERS]]
     for pair in shown:
         half = len(pair) // 2

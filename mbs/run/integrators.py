@@ -93,11 +93,6 @@ class Choice(NamedTuple):
         last, _, before = self.name.partition(AFTER)
         return f"{before}, then {last}" if before else last
 
-    @property
-    def is_automatic(self) -> bool:
-        """Whether the program made it, not the scene."""
-        return self.reason != ASKED_FOR
-
     def changed_in(self, run: _core.TreeRun) -> Choice:
         """Return the choice with any change during `run`, with time and reason."""
         if not run.changes:
