@@ -159,7 +159,8 @@ def with_paths(scene: Scene, model: Model, judge: Judge, stage: Callable[[str], 
     notes = list(dict.fromkeys(remark for _, table in tables for remark in table.remarks))
     splines = ((one.name, table.abrupt_hold) for one, table in tables if one.profile in (None, "spline"))
     notes += [f'trajectory "{name}": {hold}' for name, hold in splines if hold]
-    asking = {one.name: one.shaper for one in scene.trajectory if one.shaper and one.shaper.asks_robot}
+    shapers = {one.name: one.shaper for one in scene.trajectory if one.shaper is not None}
+    asking = {name: shaper for name, shaper in shapers.items() if shaper.kind != "none" and shaper.frequency is None}
     if asking:
         paths = [path for one in scene.trajectory if (path := one.path) is not None]
         begin, end = min(path.begin for path in paths), max(path.end for path in paths)

@@ -62,11 +62,6 @@ class Shaper(Record):
             raise ValueError('expected one of the keys "frequency" and "modes", found both')
         return self
 
-    @property
-    def asks_robot(self) -> bool:
-        """Whether the frequencies of the robot have to be computed first."""
-        return self.kind != "none" and self.frequency is None
-
     def shape(self, motion: Piecewise) -> Piecewise:
         """The motion, shaped for each frequency; unchanged as long as there is none."""
         if self.kind == "none" or self.frequency is None:
