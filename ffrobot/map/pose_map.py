@@ -166,7 +166,9 @@ def plan_map(
     if orientation == "auto":
         keeps = any(axis.is_place for axis in axes) and any(path.orientation is not None for path in loaded.trajectory)
     response = np.zeros(0) if frequencies is None else frequencies
-    return MapPlan(scene, axes, point or default_point(loaded), keeps, count, response, folder, milling)
+    return MapPlan(
+        scene, axes, point or default_point(loaded), keeps, count, frequencies=response, folder=folder, milling=milling
+    )
 
 
 def default_point(scene: Scene) -> str:
