@@ -43,7 +43,6 @@ def cache_folder(*names: str) -> Path:
 
 @cache
 def _warn(place: Path, problem: str) -> None:
-    """Once in a process."""
     warnings.warn(
         f"{place}: not used as cache, since {problem}: remove it, or set XDG_CACHE_HOME to a folder of your own;"
         " nothing is kept until then",

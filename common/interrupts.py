@@ -14,7 +14,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class EndOfCommand:
-    """The command line's answer: `KeyboardInterrupt`, and the `number` of the signal, 0 before one has come.
+    """Signal handler of the command line: raises `KeyboardInterrupt`, keeps the signal's `number`, 0 before one.
 
     While a module is loaded, the process ends at once, with the exit code of a command that was stopped: what Python
     loads modules with would print stacks, or swallow the exception.

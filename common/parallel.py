@@ -28,7 +28,7 @@ def is_apart() -> bool:
 
 
 def processes() -> int:
-    """The number of processes that do the same; 1 without mpirun, and where they work apart."""
+    """Return the number of processes of mpirun; 1 without it, and where they share only jobs (`work_apart`)."""
     return 1 if _is_apart else _environment(_SIZES, 1)
 
 

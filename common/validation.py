@@ -272,7 +272,6 @@ def _tagged(records: Sequence[type[BaseModel]], tag: str) -> list[type[BaseModel
 
 
 def _known_keys(records: Iterable[type[BaseModel]], space: str | None) -> list[str]:
-    """The keys of tables in scenes of a `space`."""
     fields = [entry for record in records for entry in record.model_fields.items()]
     return list(dict.fromkeys(field.alias or name for name, field in fields if is_key(field, space)))
 

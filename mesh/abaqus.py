@@ -113,7 +113,6 @@ class _Assembled:
                     yield name, f" of instance {own}" if own else "", of or own, number
 
     def _faces(self) -> dict[str, list[Integers]]:
-        """Sides of solids by *SURFACE, and surface elements by set."""
         faces: dict[str, list[Integers]] = {}
         for own, instance in self.scopes.items():
             for keyword in instance.faces.values():

@@ -89,7 +89,6 @@ def read_foreign(path: Path) -> RawMesh:
 
 
 def _in_words(error: BaseException) -> str:
-    """What is wrong, of whatever a reader raises."""
     if isinstance(error, KeyError):
         kind = _VTK_TYPES.get(error.args[0], error.args[0]) if error.args else "unknown ones"
         return f"cells or data of a kind that it does not know: {kind}"

@@ -59,7 +59,6 @@ def _by_gmsh(content: bytes, is_old: bool) -> RawMesh:
 
 
 def _check_partitions(content: bytes) -> None:
-    """Check that a file of version 4 has all partitions of a mesh."""
     if b"$PartitionedEntities" not in content:
         return
     entities = [entity for entity in gmsh.model.getEntities(3) if gmsh.model.mesh.getElements(*entity)[0].size]

@@ -321,7 +321,6 @@ class _Deck:
 
 
 def _add(cards: dict[int, Card], card: Card, number: int) -> None:
-    """Add a card by its number; twice the same is once."""
     other = cards.setdefault(number, card)
     if other is not card and (other.name, other.fields) != (card.name, card.fields):
         raise InputError(f"{card}: expected cards with unique numbers", f"{number} again ({other.place})")

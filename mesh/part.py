@@ -93,9 +93,9 @@ def is_step(file: Path) -> bool:
 
 
 def source_of_file(file: Path, record: SolidMeshRecord, metres: float) -> Source:
-    """The mesh of a part's file, made by gmsh of a STEP file, in the file's own numbers, whose unit has `metres`.
+    """Read a mesh file, or mesh a STEP file by `record` with gmsh; coordinates are in the file's unit of `metres` m.
 
-    Raises `InputError` where it cannot be read or made.
+    Raises `InputError` where it cannot be read or meshed.
     """
     if is_step(file):
         from .gmsh_parts import mesh_step
@@ -124,7 +124,6 @@ def _box(geometry: SolidGeometry, record: SolidMeshRecord) -> PartMesh:
 
 
 def _placed(part: PartMesh, geometry: SolidGeometry) -> PartMesh:
-    """The part of a file in the link's frame, in m."""
     x_axis, y_axis = np.array(geometry.x_axis), np.array(geometry.y_axis)
     z_axis = np.cross(x_axis, y_axis)
     x_axis, z_axis = x_axis / np.linalg.norm(x_axis), z_axis / np.linalg.norm(z_axis)

@@ -45,7 +45,7 @@ SEED = 0  # of the evolution: the same scene gives the same patches
 
 @struct
 class PatchableLink:
-    """A link to place the patches of a layout on, by the m coordinates p that these reach."""
+    """A link to place the patches of a layout on; p (m,), √kg·m, are what its patches can move of its modes."""
 
     array: PatchArray  # of the layout, where the scene has its patches, on p
     bodies: tuple[str, ...]  # whose modal coordinates are those of the link in linear models: itself, or its pieces
@@ -334,7 +334,7 @@ class PatchPlacement(InstantAnalysis):
 
     @property
     def needs_times(self) -> bool:
-        """Unless the whole motion counts."""
+        """Whether it needs an instant to place patches for: not where a criterion counts the whole motion."""
         return not self.is_over_path
 
     def references(self) -> Iterator[Reference]:

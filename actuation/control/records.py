@@ -434,7 +434,7 @@ class SampledAnalysis(ActuatedAnalysis):
             yield Reference("tip", self.tip)
 
     def prescribed(self) -> Iterator[tuple[str, TimeFunction, int]]:
-        """Yield the disturbances with their labels."""
+        """Yield label, function of time and order of derivatives needed, 0, of each component of disturbances."""
         for k, load in enumerate(self.disturbance, 1):
             for component, function in load.components.items():
                 yield f"disturbance no. {k}: {component}", function, 0

@@ -127,7 +127,6 @@ def view(file: Path, output: Path | None, movie: Path | None, seconds: float, **
 
 
 def _tell(paths: Iterable[Path], notes: Iterable[str] = ()) -> None:
-    """What was written, and what was not as it should be."""
     for path in paths:
         click.echo(path)
     for note in notes:

@@ -19,12 +19,10 @@ if TYPE_CHECKING:
 
 
 def _texts(context: click.Context, parameter: click.Parameter, value: str | None) -> list[str] | None:
-    """The parts of a list with commas."""
     return None if value is None else [part.strip() for part in value.split(",")]
 
 
 def _numbers(context: click.Context, parameter: click.Parameter, value: str | None) -> list[float] | None:
-    """Likewise, as numbers."""
     try:
         return None if value is None else [float(part) for part in value.split(",")]
     except ValueError:

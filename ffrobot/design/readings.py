@@ -91,7 +91,7 @@ class Response:
         raise NotImplementedError
 
     def follow(self, results: Results, nominal: Reading) -> Reading:
-        """Return the response in `results` of a changed scene, at the place of the `nominal` one."""
+        """Return the response in `results` of a changed scene: at the time, column or mode of `nominal`, if any."""
         return self.read(results)
 
 

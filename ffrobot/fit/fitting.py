@@ -84,7 +84,6 @@ def _fitted_name(path: Path, more: str = "") -> Path:
 
 
 def _beside(path: Path, output: Path | None) -> Path:
-    """`output`, or the fitted file of `path`."""
     if output is not None and output.parent.resolve() != path.parent.resolve():
         raise InputError(f"{output}: output: expected a file next to {path}, to which its file names are relative")
     return output or _fitted_name(path)

@@ -275,7 +275,6 @@ class Results:
         return name
 
     def _with(self, group: str) -> list[str]:
-        """Names of the analyses with such a group."""
         return [name for name in self.analyses if self.has(f"{name}/{group}")]
 
     @property

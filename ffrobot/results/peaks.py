@@ -78,9 +78,9 @@ def _of_joint(result: AnalysisResult, joint: JointRecord, place: str) -> Iterato
 
 
 def peak_of(dataset: h5py.Dataset, time: Array, column: int | None = None) -> tuple[float, float]:
-    """Largest size of all columns, or of one, in the dataset's unit, and its time, s.
+    """Return the largest absolute value of one column or of all (of vectors: length), in its unit, and its time, s.
 
-    From the outputs where the file has no peak: of a component of a vector, whose length has one, and in old files.
+    Where the file has no such peak (a column of a vector, old files), the largest at the outputs `time` (T,), s.
     """
     peaks, times = (np.atleast_1d(dataset.attrs.get(key, ())) for key in ("peak", "peak_time"))
     if len(peaks) and (column is None or len(peaks) == np.prod(dataset.shape[1:])):

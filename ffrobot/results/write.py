@@ -350,7 +350,7 @@ def _write_joints(group: h5py.Group, solution: Solution, result: AnalysisResult)
 def write_state(file: h5py.File, solution: Solution) -> None:
     """Add the state of an interrupted run to its results file, for `resume_scene`, and fingerprints of its input.
 
-    Python files that those of the scene import have names from its folder on.
+    Fingerprints of imported Python files stand at their paths relative to the scene's folder.
     """
     scene, folder = solution.scene, solution.scene.path.parent
     file.attrs["input_files"] = json.dumps(input_files(scene))

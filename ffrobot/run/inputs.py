@@ -28,7 +28,6 @@ def named_files(data: Any, folder: Path) -> Iterator[Path]:
 
 
 def _named(data: Any, folder: Path) -> Iterator[tuple[str, Path]]:
-    """The keys that name a file, with the file."""
     for key, value in data.items() if isinstance(data, dict) else enumerate(data):
         if isinstance(value, dict | list):
             yield from _named(value, folder)

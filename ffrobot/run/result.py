@@ -140,7 +140,7 @@ class AnalysisResult:
 
     @classmethod
     def of(cls, prepared: Prepared, run: Run, earlier: Mapping[str, AnalysisResult]) -> Self:
-        """What is read off a run; what has peaks at its outputs and between, as far as that is known."""
+        """Make the result of a `run`, with peaks between outputs where known; `earlier`: results by analysis."""
         seen, sharing = shared_evenly(replace(run, links=links_in_pieces(prepared)))
         twists = {joint: gear.curve for joint, gear in gear_motions(seen).items()}  # splines through outputs
         known = {joint: curve for joint, curve in twists.items() if curve is not None}

@@ -56,7 +56,10 @@ class Recording:
         return float(np.median(np.diff(self.times)))
 
     def dense(self, step: float) -> tuple[Array, Array]:
-        """Return times (T,), s, and set points (T, n), rad or m: with rates, of cubics every `step` s at most."""
+        """Return times (T,), s, and set points (T, n), rad or m, at most `step` s apart, by cubics with recorded rates.
+
+        Without rates they are those recorded.
+        """
         if self.rates is None:
             return self.times, self.values
         parts = [np.linspace(a, b, int(np.ceil((b - a) / step)) + 1)[1:]

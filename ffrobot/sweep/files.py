@@ -166,7 +166,6 @@ def number_of(tables: Table, key: tuple[str, ...], label: str, whole: tuple[str,
 
 
 def _read(path: Path, kind: str) -> Table:
-    """The tables of a file, with names of files made absolute."""
     tables = load_toml(path, kind)
     _resolve(tables, path.absolute().parent)
     return tables

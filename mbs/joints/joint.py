@@ -297,7 +297,7 @@ class JointRecord(Record):
 
     @property
     def asks_for_coordinate(self) -> tuple[str, ...]:
-        """Keys that require its coordinate in the tree; where it closes a loop only a rotor's exists."""
+        """Keys for which loops are not cut here: motors without rotors, and springs of rotors, need a coordinate."""
         keys = ("stiffness",) if getattr(self, "rotor_inertia", 0.0) else ("motor",)
         return tuple(key for key in keys if getattr(self, key, None))
 

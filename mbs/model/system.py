@@ -150,7 +150,6 @@ class MultibodySystem:
         return is_driven
 
     def _check(self) -> None:
-        """Raise `InputError` for what the core does not take."""
         loaded = {load.joint for load in self.model.scene.load}
         for joint in (node.joint for node in self.model.tree.nodes if node.joint.type == "planar" and node.backwards):
             if joint.frictions or joint.name in loaded:

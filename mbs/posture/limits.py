@@ -57,7 +57,7 @@ def watched(tree: KinematicTree) -> list[Watched]:
 
 
 def watch_limits(scene: _core.TreeScene, tree: KinematicTree) -> None:
-    """Have the core watch those coordinates while it integrates `scene`."""
+    """Have the core watch coordinates with limits (`watched`) while it integrates `scene`."""
     for one in watched(tree):
         scene.add_limit(one.v, *one.limits)
 

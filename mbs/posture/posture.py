@@ -290,7 +290,10 @@ def _jump(function: TimeFunction, end: float, order: int) -> tuple[float, float,
 
 
 def misfits(function: TimeFunction, times: Array, order: int) -> Array:
-    """Deviations (T − 1, …) of the trapezoidal rule on the next derivative from changes between `times` (T, …), s."""
+    """Return how far changes of derivative `order` between `times` (T, …), s, are off the integral of the next one.
+
+    (T − 1, …) in the unit of that derivative, by the trapezoidal rule; 0 where not finite.
+    """
     value, slope = function.sample(times.ravel())[order : order + 2].reshape(2, *times.shape)
     missed: Array = np.abs(np.diff(value, axis=0) - 0.5 * np.diff(times, axis=0) * (slope[1:] + slope[:-1]))
     return np.nan_to_num(missed, nan=0.0, posinf=0.0)

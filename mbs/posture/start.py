@@ -169,7 +169,10 @@ def _with_slides(model: Model, q: Array) -> Array:
 
 
 def relaxed_gears(model: Model, state: State) -> State:
-    """The state with motors where their gears are not strained; joints where motors follow a trajectory."""
+    """Return `state` with no compliant gear twisted, nor at a rate.
+
+    Motors move to their joints; where a trajectory prescribes the motor, its joint moves to it.
+    """
     q, v = state.q.copy(), state.v.copy()
     locked = {row.coordinate for row in model.rows if row.kind == "coordinate"}
     for gear in model.tree.gears:

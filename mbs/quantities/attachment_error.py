@@ -99,7 +99,7 @@ def start_errors(start: Start) -> tuple[float, float]:
 
 
 def start_of_motion(run: Run) -> Start:
-    """Return the initial state of a run for error estimates."""
+    """Return what `start_errors` needs: matrices, accelerations at the start, largest strain energy, duration."""
     tree, n_v = run.model.tree, run.model.tree.n_v
     stiffness, late, damping = np.zeros(n_v), np.zeros(n_v), np.zeros((n_v, n_v))
     energy = np.zeros(len(run.time))

@@ -110,10 +110,10 @@ def mode_displacement(p: Array) -> Recovery:
 def mode_acceleration(
     body: ModalBody, T: Array, p: Array, loads: Mapping[str, Array], sections: SectionLoads | None = None
 ) -> Recovery:
-    """Return the recovery with static stresses of loads that the file contains.
+    """Return what stresses are made of: modes without their static share, and sizes of loads with static stresses.
 
-    `body` is as its file has it, p (outputs, n) in its modal coordinates, which are T (n, m) times those in the
-    equations; `loads` are sizes (outputs,) of unit loads by name.
+    `body` is as its file has it, p (outputs, n), √kg·m, in its modal coordinates, which are T (n, m) times those in
+    the equations; `loads` are sizes (outputs,) of unit loads by name, and `sections` what layers add.
     """
     known = [name for name in body.stress_loads if name in loads]
     if not known:

@@ -287,9 +287,9 @@ class Bending:
 
 
 def enough_pieces(shortening: float, count: int) -> int:
-    """Return the number of pieces for a link that in `count` pieces shortens by that part of its length.
+    """Return how many pieces, 2 or more, bend so little that each shortens by `ENOUGH` of its length.
 
-    It goes down with the square of their number.
+    The `shortening` of a link in `count` pieces is relative to its length, and falls with the square of their number.
     """
     return max(2, ceil(count * sqrt(shortening / ENOUGH)))
 

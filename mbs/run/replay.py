@@ -41,9 +41,10 @@ def replay_times(source: Run, analysis: TimedAnalysis) -> Array:
 
 
 def supplied(run: Run, most: Array, patches: Mapping[str, PatchedLink], *, limited: bool) -> _core.ForceSource:
-    """Forces of all motors, `most` (motors,) at most, and voltages of the patches of links by body, within limits.
+    """Return the forces that `run` found, for the core to apply: of motors, N·m or N, then voltages of `patches`, V.
 
-    In the order of `Model.motors`, N·m or N on second sides, then of `patches`, V.
+    Motors, in the order of `Model.motors`, act on second sides with at most `most` (motors,); `limited`: voltages stay
+    within the ranges of amplifiers.
     """
     if run.prescribed is not None and run.prescribed.voltages:
         torques = _found(run, lambda driven: _core.actuator_reader(driven, most, []))

@@ -210,7 +210,6 @@ class SidObject:
 
 
 def _parse(text: str) -> tuple[str, SidObject]:
-    """The first line, and what follows as a tree."""
     head, *lines = text.splitlines() or [""]
     top = SidObject("file")
     stack = [top]

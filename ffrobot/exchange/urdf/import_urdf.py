@@ -214,7 +214,6 @@ def _scene_text(urdf: Path, keys: Mapping[str, Any], remarks: list[str]) -> str:
 
 
 def _comment(text: str) -> str:
-    """A comment of one line, whatever names in `text` hold."""
     return "# " + "".join(c if c.isprintable() else "_" for c in text)
 
 

@@ -213,7 +213,7 @@ def motor_limits(results: Results, figure: FigureRecord) -> Array:
 def limit_curves(limits: MotorLimits, speed: float, moment: float) -> Array:
     """Return the bounds |τ| ≤ τ_max, |γ̇| ≤ γ̇_max and |τ γ̇| ≤ P_max: (n, 2) speeds and moments, NaN between pieces.
 
-    Units are those of `speed` and `moment`, the largest of the data, as far as which curves go that no limit ends.
+    `speed` (rad/s or m/s) and `moment` (N·m or N) are the largest of the data; curves without an end go further.
     """
     has_moment, has_speed, has_power = known = np.isfinite([limits.moment, limits.speed, limits.power])
     if not known.any():

@@ -176,7 +176,8 @@ def _charts(body: ModalBody, prefix: str) -> list[Chart]:
 def surface_modes(links: Sequence[ModesOnPage]) -> dict[str, Any]:
     """Return surfaces with mode shapes as data for the page's script; links without known surface are omitted.
 
-    Of each, points (p, 3), m, triangles (t, 3), and modes (m, p, 3) of which the largest displacement is `FINEST`.
+    Each link has, in base64, `points` (p, 3), m, of a coarsened surface, its `triangles` (t, 3), and up to twelve
+    `modes` (m, p, 3): integers up to `FINEST`, times `amplitude` m.
     """
     entries = []
     for link in links:
