@@ -1,4 +1,4 @@
-"""What an analysis may use that knows of patches."""
+"""Context of analyses of robots with patches."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @struct
 class ActuatedContext(Context):
-    """Context with `patches` by body, modal bodies of `links`, and bodies `carrying` all their payloads."""
+    """Context with `patches` and modal bodies of `links` by name, and the equations of links `carrying` payloads."""
 
     _: KW_ONLY
     patches: Mapping[str, LinkPatches] = field(default_factory=dict)

@@ -37,20 +37,20 @@ ROUND_OFF = 1e-6  # of the largest modal force: less is what ill-conditioned pat
 class Unsupplied:
     """Path error of motors and patches that cannot supply the modal forces of a path."""
 
-    bodies: tuple[str, ...]  # links without patches or points, or with too few, for the modal forces required
+    bodies: tuple[str, ...]  # links with too few patches or actuation points for the modal forces required, or none
     with_patches: bool  # whether any link has patches
-    point: str = ""  # of a trajectory (of any body where trajectories are of angles), with the largest error
-    # m, largest distance from the path where the motors keep the computed angles, quasi-static
+    point: str = ""  # that with the largest error: on trajectories, or of any body where these are of angles
+    # m, largest distance of `point` from its path where the motors keep the computed angles, quasi-static
     angles_kept: float = 0.0
     at_start: float = 0.0  # m, likewise at the first output: the sag of the links
-    # m, likewise where they repeat the computed torques: the first vibration, without the drift that follows
+    # m, likewise where motors repeat the computed torques: the first vibration, without the drift that follows
     moments_repeated: float = 0.0
-    # 1/s, of deviations under these torques (`open_loop_growth`); 0 where none grows, nan if unknown
+    # 1/s, growth rate of deviations under these torques (`open_loop_growth`); 0 where none grows, nan if unknown
     growth: float = 0.0
-    families: tuple[str, ...] = ()  # in 3D, of each body, those of the modes concerned
-    # in 3D, m, of each body, the largest of a point by Φ K⁻¹ r, quasi-static, with the supports of its modes
+    families: tuple[str, ...] = ()  # in 3D, for each of `bodies`: those of its modes with unmet forces r
+    # in 3D, m, for each of `bodies`: largest |Φ K⁻¹ r| of its points, quasi-static, with the supports of its modes
     deflection: tuple[float, ...] = ()
-    rotation: tuple[float, ...] = ()  # in 3D, rad, likewise, of a section
+    rotation: tuple[float, ...] = ()  # in 3D, rad, for each of `bodies`: largest |Φ_r K⁻¹ r| of its sections
 
     @property
     def drift(self) -> str:
@@ -59,7 +59,7 @@ class Unsupplied:
 
     @property
     def in_words(self) -> str:
-        """Explanation and remedies as text."""
+        """Message with the links, the path error and a remedy."""
         links = [
             f"{body} ({families}), off by {_length(deflection)}"
             + (f" and {np.degrees(turn):.2g}°" if turn > NEGLIGIBLE else "")
@@ -78,10 +78,9 @@ class Unsupplied:
 
 
 def quasi_static_shift(run: Run, modal: Mapping[str, Array], points: Iterable[str]) -> dict[str, Array]:
-    """Return the shift (T, 3), m, global axes, of points by name under modal forces r (T, n), N/√kg, by body.
+    """Return the shift (T, 3), m, global axes, of points by name where `modal` forces F (T, n), N/√kg, by body lack.
 
-    With motors locked, to first order and quasi-static: δp = −K⁻¹ r and δr = (∂r/∂p) δp. The vibration after a sudden
-    lack of force can be twice as large.
+    With motors locked, to first order and quasi-static: δp = −K⁻¹ F.
     """
     shift, _ = _locked(run, modal)
     places = run.model.tree.places(run.q, shift)
@@ -89,10 +88,10 @@ def quasi_static_shift(run: Run, modal: Mapping[str, Array], points: Iterable[st
 
 
 def freed_shift(run: Run, modal: Mapping[str, Array], point: str, rows: Indices) -> Array:
-    """Return the shift (len(rows), 3), m, of a point at some outputs if motors keep their torques: the robot recoils.
+    """Return the shift (len(rows), 3), m, of a point at outputs `rows` if motors keep their torques: the robot recoils.
 
-    Under modal forces (T, n), N/√kg, by body: δq = δq_locked + R γ with Rᵀ M δq = 0, R = ∂q/∂γ, as no momentum comes
-    from within.
+    Where `modal` forces (T, n), N/√kg, by body lack: δq = δq_locked + R γ with Rᵀ M δq = 0, R = ∂q/∂γ of motor angles
+    γ, as inner forces do not change momentum.
     """
     shift, R = _locked(run, modal, rows)
     MR = mass_matrices(run.model, run.q[rows]) @ R
@@ -157,21 +156,22 @@ class Remedies:
 
 @struct
 class PatchFeasibility:
-    """Requirements on the patches of one body in one analysis; k patches, n modes, peaks over time.
+    """Requirements on the patches of one layout in one analysis; k patches, n modes, peaks over time.
 
     Attributes:
-        required_moment: (k,) N·m, c times the required voltage.
-        available_moment: (k,) N·m, c times the limit.
+        required_moment: (k,) N·m at the required voltage, `PatchArray.moment_per_volt` times it.
+        available_moment: (k,) N·m at the limit.
         saturation_time: (k,) s, when a limit is first exceeded; NaN where none is.
         slew: (k,) V/s, largest of the required voltage, mean between outputs.
         slew_limit: (k,) V/s.
-        current: (k,) A, largest at the required voltage, mean between outputs.
+        current: (k,) A, largest at the required voltage and strain, mean between outputs.
         current_limit: (k,) A.
         field: (k,) V/m in a layer at the required voltage.
         limited_field: (k,) V/m at the voltage within the limit.
         strain: (k,) of the outer surface, from the bending of the link, its mean along the patch.
         mode_required: (n,) N/√kg, largest modal force.
         mode_available: (n,) N/√kg, modal force with every patch at its limit.
+        find_remedies: computes `remedies`.
     """
 
     required_moment: Array
@@ -242,9 +242,9 @@ def judge_patches(
 ) -> PatchFeasibility:
     """Return the requirements on the patches of one layout.
 
-    By modal coordinates p (T, n), m·√kg, and forces F_p (T, n), N/√kg, on the modes of the layout at `time` (T,), s.
-    `with_count(k)`: the largest voltage (V) of k such patches, evenly spread; None where they have no room. Without
-    it no other numbers of patches are tried.
+    Modal coordinates p (T, n), m·√kg, and required forces F_p (T, n), N/√kg, are on the modes of the layout at `time`
+    (T,), s. `with_count(k)` is the largest voltage (V) of k such patches, evenly spread, None where they have no room;
+    without this function no other numbers of patches are tried.
     """
     amplifiers, layout, pace = patches.amplifiers, patches.layout, 1.0 / np.diff(time)[:, None]
     required, limit = worst(voltages.required, amplifiers.range)
@@ -274,9 +274,9 @@ def judge_patches(
 
 
 def worst(values: Array, range: Array) -> tuple[Array, Array]:
-    """Return of `values` (T, k) those (k,) with the largest share of their limits, as absolute values, and the limits.
+    """Return the absolute value (k,) in each column of `values` (T, k) with the largest share of its limit, and limits.
 
-    `range` (2, k): the negative limits, then the positive ones, in the unit of the values.
+    `range` (2, k) has the negative limits, then the positive ones; all in the unit of the values.
     """
     pair = np.array([-values.min(axis=0, initial=0.0), values.max(axis=0, initial=0.0)])
     limit = np.abs(range)
@@ -312,16 +312,16 @@ def _remedies(
 
 @struct
 class LinkInMotion:
-    """A link with modes, over time."""
+    """Motion of a link with n modes, and the modal forces required."""
 
     modal: ModalBody
-    spatial: Body  # its equations
+    spatial: Body  # equations of the link, with payloads
     p: Array  # (T, n) m·√kg, coordinates of the modes of the modal body
-    F_p: Array  # (T, n) N/√kg, modal forces on these required of patches
+    F_p: Array  # (T, n) N/√kg, forces on these modes required of patches
 
 
 def links_in_motion(run: Run, bodies: Mapping[str, tuple[ModalBody, Body]]) -> dict[str, LinkInMotion]:
-    """Return the links of a motion by name; `bodies`: their modal bodies and equations."""
+    """Return the motion of each link by name; `bodies`: modal bodies and equations of these links."""
     forces, links = actuator_forces(run), {}
     assert forces is not None
     for name, (modal, spatial) in bodies.items():
@@ -339,7 +339,8 @@ def judge_actuators(
 ) -> Feasibility:
     """Return the requirements on motors by joint ("JOINT 2" of a second coordinate) and on patches by layout.
 
-    `patches` by link, `voltages` by layout; `others`: links on which something else supplies modal forces.
+    `path` is that of the scene file, `patches` are by link, `voltages` by layout. `others`: links that need no patches,
+    as forces at their actuation points act.
     """
     judged: dict[str, PatchFeasibility] = {}
     for body, of_link in patches.items():
@@ -373,7 +374,7 @@ def find_unmet(
     *,
     limited: bool,
 ) -> dict[str, Array]:
-    """Return unmet modal forces (T, n), N/√kg, by link, at required voltages or at those within limits."""
+    """Return unmet modal forces (T, n), N/√kg, by link, at voltages within limits (`limited`) or at required ones."""
     unmet = {}
     for name, link in links.items():
         unmet[name] = link.F_p
@@ -391,7 +392,10 @@ def find_unsupplied(
     voltages: Mapping[str, Voltages],
     others: Container[str],
 ) -> Unsupplied | None:
-    """Return the path error by modal forces that voltages cannot supply; None if they bend no link but `others`."""
+    """Return the path error by modal forces that voltages cannot supply; None if these bend no link.
+
+    Arguments as of `judge_actuators`: links among `others` do not count.
+    """
     largest = max((float(np.abs(link.F_p).max(initial=0.0)) for link in links.values()), default=0.0)
     unsupplied: list[tuple[float, float, str, str]] = []
     for name, left in find_unmet(links, patches, voltages, limited=False).items():

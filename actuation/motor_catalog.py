@@ -16,7 +16,7 @@ from ..common.validation import Record, validate
 
 
 class CatalogMotor(Record):
-    """A motor with the gears that it is sold with; all values at the motor, before the gear."""
+    """A motor of a catalog with its gears; all values are at the motor, before the gear."""
 
     name: str
     """Name of the motor."""
@@ -43,7 +43,10 @@ class _Catalog(Record):
 
 
 class JointTask(NamedTuple):
-    """Task of a joint over `time` (T,), s: `load` (T,), N·m or N, without any rotor; rate and acceleration (T,), SI."""
+    """Task of a joint over `time` (T,), s: `load` (T,), N·m or N, without any rotor; rate and acceleration (T,).
+
+    The rate is in rad/s or m/s, the acceleration in rad/s² or m/s².
+    """
 
     time: Array
     load: Array
@@ -52,7 +55,7 @@ class JointTask(NamedTuple):
 
 
 class MotorChoice(NamedTuple):
-    """A motor with one of its gears on a joint: RMS and peak of its torque (N·m or N), and its speed (rad/s or m/s)."""
+    """A motor with one gear `ratio` on a joint: RMS and peak of its torque (N·m or N), peak speed (rad/s or m/s)."""
 
     motor: CatalogMotor
     ratio: float
@@ -107,7 +110,7 @@ def _numbers(text: Any) -> Any:
 
 
 def choices(task: JointTask, catalog: Sequence[CatalogMotor]) -> list[MotorChoice]:
-    """Return every motor with each of its gears: fitting ones first, ordered by mass (or size)."""
+    """Return every motor with each of its gears: fitting ones first, ordered by mass, then by rated torque."""
 
     def order(one: MotorChoice) -> tuple[float, ...]:
         motor, mass = one.motor, np.inf if one.motor.mass is None else one.motor.mass
@@ -117,7 +120,10 @@ def choices(task: JointTask, catalog: Sequence[CatalogMotor]) -> list[MotorChoic
 
 
 def choice_of(task: JointTask, motor: CatalogMotor, N: float) -> MotorChoice:
-    """Judge a motor with gear ratio N: τ = J N α + L/(N η) while the load L takes power, J N α + η L/N else."""
+    """Judge a motor with gear ratio N: τ = J N α + L/(N η) while the load L takes power, J N α + η L/N else.
+
+    J is the inertia of the rotor, α the acceleration of the joint, η the efficiency of the gear.
+    """
     is_driven = task.load * task.rate >= 0.0
     through = np.where(is_driven, 1.0 / motor.efficiency, motor.efficiency)
     torque = motor.rotor_inertia * N * task.acceleration + task.load * through / N

@@ -27,29 +27,29 @@ JUMP = 0.05  # of the largest acceleration or jerk of the path: less is none
 class MotorFeasibility:
     """Requirements on one motor at the joint, and its limits (infinite if none): N·m, rad/s, W; or N, m/s, W."""
 
-    moment: float  # largest absolute value, as those of speed and power
+    moment: float  # largest absolute value; speed and power likewise
     moment_limit: float
     speed: float
     speed_limit: float
     power: float
     power_limit: float
     saturation_time: float  # when a limit is first exceeded, s; NaN where none is
-    # root mean square over the path, from t = 0 to the end of the analysis: a constant torque of this size heats the
-    # windings as much (thermal-equivalent torque)
-    rms_moment: float = np.nan  # these are not in files of version 0.1
+    # root mean square from t = 0 to the end of the analysis (thermal-equivalent torque)
+    rms_moment: float = np.nan  # this field and all below are not in files of version 0.1
     usual_moment: float = np.nan  # not exceeded for 99 % of the time, pre- and post-actuation included
     moment_time: float = np.nan  # when the torque is largest, s
     share_beyond: float = np.nan  # share of the time on the path beyond any limit
-    # largest of the robot along the joint, with other joints locked and links rigid, without the rotor, kg·m² (kg); NaN
-    # where loops share it among joints
+    # largest inertia of the robot along the joint, with other joints locked and links rigid, without the rotor, kg·m²
+    # (kg); NaN where loops share it among joints
     load_inertia: float = np.nan
     jump: str = ""  # "acceleration" or "jerk" of the path if its jump causes a short peak; else ""
-    # largest at rest along the path, which a slower path does not reduce; NaN if within the limit, or not known
+    # largest torque at rest along the path, which a slower path does not reduce; NaN if all are within the limit, or
+    # not known
     static_moment: float = np.nan
 
     @property
     def factor(self) -> float:
-        """The largest ratio of a peak to its limit."""
+        """Largest ratio of peak torque, speed or power to its limit."""
         return max(self.moment / self.moment_limit, self.speed / self.speed_limit, self.power / self.power_limit)
 
     @property
@@ -98,7 +98,7 @@ def judge_motors(run: Run) -> dict[str, MotorFeasibility]:
 
 
 def static_moments(run: Run, end: float) -> Mapping[str, Array]:
-    """Return torques (T, k) by joint, N·m or N, in equilibria at up to 21 instants of a path from t = 0 to `end` (s).
+    """Return motor torques (T, coordinates) by joint, N·m or N, in T ≤ 21 equilibria on a path from t = 0 to `end` (s).
 
     Empty where there is no equilibrium, or motors do not fit the path.
     """
@@ -136,9 +136,9 @@ def _load_inertias(run: Run) -> dict[str, tuple[float, ...]]:
 
 
 def judge_motion(time: Array, moment: Array, rate: Array, limits: MotorLimits, end: float) -> MotorFeasibility:
-    """Return the requirements of torques `moment` (T,) at rates (T,) of a joint over `time` (T,); SI units.
+    """Return the requirements of torques `moment` (T,), N·m or N, at rates (T,), rad/s or m/s, over `time` (T,), s.
 
-    Root mean square and shares of time are those from 0 to `end` (s), without pre- and post-actuation.
+    Root mean square and share of the time beyond limits are those from 0 to `end` (s), without pre- and post-actuation.
     """
     (peak, at), (speed, _), (power, _) = (largest(time, values) for values in (moment, rate, moment * rate))
     beyond = (np.abs(moment) > limits.moment) | (np.abs(rate) > limits.speed) | (np.abs(moment * rate) > limits.power)
@@ -166,9 +166,10 @@ def first_time(time: Array, beyond: Booleans) -> Array:
 
 
 def path_jump(run: Run, at: float) -> str:
-    """Return which derivative of a trajectory jumps near the time `at` (s), if torques follow from it.
+    """Return which derivative of a trajectory jumps near the time `at` (s), so that torques jump, too.
 
-    "acceleration", in motors-only analyses "jerk" too, else "". A path is constant before t = 0 and after its end.
+    The result is "acceleration", in motors-only analyses also "jerk", or "" without a jump. A path is constant before
+    t = 0 and after its end.
     """
     end = run.analysis.last_time
     if end <= 0.0 or len(run.time) < 2:

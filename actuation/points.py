@@ -57,7 +57,7 @@ class ActuationPoints(Record):
 
     @property
     def places(self) -> list[tuple[str, Place]]:
-        """Key and place of each component."""
+        """Key and place (m from the root, or a point's name) of each component of force."""
         return [(key, place) for key in ALONG for place in getattr(self, key)]
 
     def references(self) -> Iterator[Reference]:
@@ -70,13 +70,13 @@ class ActuationPoints(Record):
 
 @struct
 class PointSet:
-    """Components of force at points of one body; SI units."""
+    """Components of force, c in all, at points of one body with n modes; SI units."""
 
     body: str  # its name
-    names: tuple[str, ...]  # of the points, one for each component
-    axes: tuple[str, ...]  # "x", "y" or "z", likewise
-    points: tuple[BodyPoint, ...]  # likewise, in the coordinates of the `Body`
-    scale: Array  # (6 + n,) factors that make the rows of L_a forces in N: 1, 1/length, √mass
+    names: tuple[str, ...]  # of the point of each component
+    axes: tuple[str, ...]  # "x", "y" or "z" of the body, along which each component acts
+    points: tuple[BodyPoint, ...]  # point of each component, with shapes of the modes in the equations
+    scale: Array  # (6 + n,) factors that make generalized forces of the body forces in N: 1, 1/length, √mass
 
     @property
     def direction(self) -> Array:
@@ -84,12 +84,15 @@ class PointSet:
         return np.eye(3)[:, [AXES.index(axis) for axis in self.axes]]
 
     def of_core(self) -> tuple[Array, Array, Array, Array]:
-        """Return directions (3, c), positions (3, c) m, shapes (3 c, n), scale for mbs/core/analysis/found_forces.h."""
+        """Return directions (3, c), positions (3, c), m, shapes (3 c, n), 1/√kg, and `scale` (6 + n,) for the core."""
         position = np.transpose([point.position for point in self.points])
         return self.direction, position, np.vstack([point.translation for point in self.points]), self.scale
 
     def L_a(self, p: Array) -> Array:
-        """Return generalized forces (T, 6 + n, c) of components of 1 N at modal coordinates p (T, n), body axes."""
+        """Return generalized forces (T, 6 + n, c) of components of 1 N at modal coordinates p (T, n), m·√kg.
+
+        They are force, N, and moment, N·m, on the frame in body axes, and forces on modes, N/√kg.
+        """
         e, columns = self.direction, []
         for k, point in enumerate(self.points):
             u = point.position + p @ point.translation.T
@@ -99,17 +102,18 @@ class PointSet:
         return np.stack(columns, axis=2)
 
     def scaled(self, p: Array) -> Array:
-        """Return L_a (T, 6 + n, c) at p (T, n), its rows as forces in N."""
+        """Return `L_a` (T, 6 + n, c) at p (T, n), m·√kg, times `scale`: forces in N."""
         return self.scale[:, None] * self.L_a(p)
 
 
 def make_point_set(
     scene_path: Path, layout: ActuationPoints, body: ModalBody | None, spatial: Body, space: Space
 ) -> PointSet:
-    """Return the components of force of the scene, or independent ones that are well conditioned.
+    """Return the components of force in `layout`, or, if it has none, independent ones that are well conditioned.
 
-    Raises `InputError` for places that the body has not, for more components than coordinates, and for dependent
-    components; in the plane for a body whose points cannot carry all its generalized forces.
+    `body` is the modal body, None of a rigid body; `spatial` its equations. Raises `InputError` for places that the
+    body does not have, for more components than coordinates, and for dependent components; in the plane also for a
+    body whose points cannot carry all its generalized forces.
     """
     key = f'{scene_path}: actuation_points "{layout.body}"'
     coordinates = len(space.translations) + len(space.rotations) + spatial.n_modes
@@ -195,11 +199,10 @@ class PointForces:
 
     Attributes:
         force: (T, c) N along each component, body axes.
-        unmet: (T, 6 + n) Q_a − L_a F_a on R and on the rotation, both in axes of the body, and on p: N, N·m, N/√kg; in
-            the plane (T, 3 + n) on (R, θ, p), R in global axes.
-        residual: (T,) N, norm of the scaled `unmet`.
-        rank: least rank of the scaled L_a.
-        condition_number: largest of the scaled L_a.
+        unmet: (T, 6 + n) driving forces Q_a − L_a F_a on R and on the rotation, both in axes of the body, and on p: N,
+            N·m, N/√kg; in the plane (T, 3 + n) on (R, θ, p), R in global axes.
+        residual: (T,) N, norm of `unmet` times `PointSet.scale`.
+        rank, condition_number: least rank and largest condition number of L_a (`PointSet.scaled`) over time.
     """
 
     force: Array
@@ -210,7 +213,7 @@ class PointForces:
 
 
 def solve_points(chosen: PointSet, run: Run) -> PointForces:
-    """Solve L_a F_a = Q_a for the forces at points at every output of a run, by least squares."""
+    """Solve L_a F_a = Q_a for the forces F_a at points of a body by its driving forces Q_a, by least squares."""
     node = run.model.tree.nodes[run.model.tree.index[chosen.body]]
     Q_a = find_driving_forces(run)[chosen.body]
     p = run.q[:, node.p_q]
@@ -253,7 +256,7 @@ def forces_at_points(chosen: Mapping[str, PointSet], run: Run) -> dict[str, Arra
 
 
 def find_driving_forces(run: Run) -> dict[str, Array]:
-    """Return Q_a (T, 6 + n) by body: force (N) and moment (N·m) on its frame, in its axes, and on its modes (N/√kg)."""
+    """Return driving forces Q_a (T, 6 + n) by body: N, N·m on its frame, in its axes, and N/√kg on its n modes."""
     model = run.model
     by_body = path_forces_on_bodies(model, run.time, run.q, run.multipliers)
     if run.required is not None:  # forces on the modes alone, for a prescribed shape

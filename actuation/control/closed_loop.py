@@ -185,9 +185,9 @@ def _resolved(source: Run) -> Run:
 def loop_models(
     model: Model, time: Array, reference: MotorCoordinates, patches: Mapping[str, LinkPatches], read: Sequence[Signal]
 ) -> tuple[LinearModel, ...]:
-    """Linearize the robot at rest on its reference at start, middle and end; the signals `read` are outputs.
+    """Linearize the robot at rest on its `reference` over `time` (T,), s: at start, middle and end.
 
-    None where it is singular, or has none yet.
+    The signals `read` are outputs. Empty where there is no linear model, as in singular postures.
     """
     rest, rows = np.zeros(model.tree.n_v), sorted({0, len(time) // 2, len(time) - 1})
     with suppress(SolveError, InputError):
@@ -205,7 +205,7 @@ def loops_about(
     """Return the linear `models`, each with the linear controllers at its time; and controllers by time (s).
 
     The latter are those at the start, or at each time of an observer's schedule. Both are empty where a controller is
-    not linear at the time of a model. `readings` (K, outputs) of the run.
+    not linear at the time of a model. `readings` (K, outputs), in units of the sensors, show how far a run deviates.
     """
     observed = controllers[0] if controllers and isinstance(controllers[0], Observed) else None
     acting, asked = (setup, controllers) if observed is None else (observed.setup, observed.controllers)
@@ -343,12 +343,11 @@ SAME = 1e-3  # of the largest response: what the states found may leave of it
 
 
 def find_feedback(setup: Setup, controllers: Sequence[Controller], readings: Array, first: int) -> Feedback | None:
-    """The controllers about the reference from sample `first` on, much nearer to it than the `readings` (K, outputs).
+    """Linearize controllers about the reference from sample `first` on; None if nonlinear, changing, or of many states.
 
-    Each reading is off at one sample alone. The change of what is then commanded is the controllers' impulse response;
-    its Hankel matrix has the rank of their states, and these as factors (B. L. Ho and R. E. Kalman, Regelungstechnik
-    14, 1966; S. Y. Kung, Asilomar Conf. 1978). None where that is no linear map that stays the same from sample to
-    sample, with few states.
+    Each reading deviates at one sample alone, by much less than `readings` (K, outputs) of a run do. The change of the
+    commands is the impulse response of the controllers; its Hankel matrix has their states as factors (B. L. Ho and
+    R. E. Kalman, Regelungstechnik 14, 1966; S. Y. Kung, Asilomar Conf. 1978).
     """
     count = min(LONGEST, len(setup.times) - first)
     if count < FEWEST:

@@ -1,6 +1,6 @@
 """Controllers: joint PID, modal velocity, linear-quadratic, computed torque, functions of Python; their protocol.
 
-A user's own controller: a function in a Python file that is given the setup and returns what is asked at samples.
+A user's own controller is a function of the setup, in a Python file, that returns the function of samples:
 
     def controller(setup):                 # actuation.control.robot.Setup
         gamma = setup.columns("joint/O")   # where readings are in y, by name
@@ -13,7 +13,7 @@ A user's own controller: a function in a Python file that is given the setup and
 
         return at_sample
 
-It reads the sensors that the scene gives.
+It reads the sensors of the scene.
 """
 
 from __future__ import annotations
@@ -45,9 +45,9 @@ from .robot import Setup, estimate
 
 
 class Controller(Protocol):
-    """Protocol of controllers, which are called at each sample and may keep a state.
+    """Protocol of controllers: u = controller(k, y) at each sample k; a controller may keep a state.
 
-    `bandwidth` (rad/s): the fastest motion that it acts on; 0 where not known.
+    `bandwidth` (rad/s) is that of the fastest motion on which it acts; 0 where not known.
     """
 
     bandwidth: float
@@ -57,7 +57,10 @@ class Controller(Protocol):
 
 
 class LinearFeedback:
-    """u = P e + D (e − e₋)/T + I ∫e with e = r − y, matrices (inputs, outputs); terms without a matrix are left out."""
+    """u = P e + D (e − e₋)/T + I ∫e with e = r − y from the reference r, e₋ one sample time T before.
+
+    Matrices are (inputs, outputs), in units of commands per reading; terms without a matrix are left out.
+    """
 
     def __init__(
         self,
@@ -106,7 +109,7 @@ def joint_pid(record: JointPid, setup: Setup) -> LinearFeedback:
 
 
 def modal_velocity(record: ModalVelocity, setup: Setup) -> LinearFeedback:
-    """Make the controller of voltages for modal forces −2 ζ ω ṗ of the lowest modes, with least spill into others."""
+    """Make the controller of voltages that damp the lowest modes by forces −2 ζ ω ṗ, with least force on others."""
     G = np.zeros((len(setup.inputs), len(setup.outputs)))
     bandwidth = 0.0
     for name in record.bodies:
@@ -140,7 +143,10 @@ def state_feedback(record: StateFeedback, setup: Setup) -> LinearFeedback:
 
 
 class ComputedTorqueControl:
-    """Torques for γ̈_ref + 2 ζ ω ė + ω² e with rigid links, less the feed-forward (Craig, Intro. to Robotics, 10.4)."""
+    """Torques for joint accelerations γ̈_ref + 2 ζ ω ė + ω² e with rigid links, less the feed-forward.
+
+    e is the error of joint coordinates (Craig, Introduction to Robotics, sec. 10.4).
+    """
 
     def __init__(self, record: ComputedTorque, setup: Setup) -> None:
         motors, is_geared = setup.robot.motors, bool(setup.robot.elastic_joints)
@@ -163,7 +169,7 @@ class ComputedTorqueControl:
 
 
 class PythonControl:
-    """Controller from a user's `factory`; checks what it returns and raises `SolveError` where that fails."""
+    """Controller from a user's function `factory` of the setup. Raises `SolveError` where that fails."""
 
     bandwidth = 0.0
 
@@ -249,7 +255,8 @@ MOST_STATES = 500  # with which the Riccati equation takes seconds, not minutes
 def gains(model: SampledModel, Q: Array, R: Array) -> Array:
     """Return K (m, n) of u = −K x with least Σ xᵀQx + uᵀRu; Q (k, k) weights the first k states, the rest are delays.
 
-    Q and R (m, m) are diagonal. Raises `ValueError` where the Riccati equation has no stabilizing solution.
+    Q and R (m, m) are diagonal, in inverse squares of the units of states and commands. Raises `ValueError` where the
+    Riccati equation has no stabilizing solution.
     """
     n, waiting = len(Q), (len(model.A) - len(Q)) // len(R)
     # in the unit of what is acceptable: all weights are one
@@ -325,9 +332,9 @@ class LqrControl:
 
 
 def design_model(record: Lqr, setup: Setup, beside: Sequence[JointPid]) -> LinearModel:
-    """Return the linear model for the design: about the reference at `time`, with the lowest modes of links.
+    """Return the linear model for the design: about the reference at `record.time`, with the lowest modes of links.
 
-    Springs and dampers replace the controllers `beside`, without sampling and delay.
+    Springs and dampers replace the joint controllers `beside`, without sampling and delay.
     """
     row = int(np.argmin(np.abs(setup.source.time - record.time)))
     mechanism = kept_modes(setup.robot.linear(row), record.modes)

@@ -33,12 +33,13 @@ MOST_WORK = 2e8  # pairs whose zeros are computed, times cubed coordinates: some
 
 @struct
 class LinearModels(Details):
-    """Linear models at the times of an analysis, with their modes, reach and zeros, one of each per time.
+    """Linear models at the times of an analysis, with modes, controllability, observability and zeros at each time.
 
     `controllable`: by motors and patches together; `observable`: by joints and points together; `zeros` by
     (inputs, outputs): from each motor to its own joint and to each coordinate of a point, from all motors to their
     joints (the frequencies with locked joints), and to as many coordinates of a point. `suggested`: gains of joint PD
-    controllers and the longest sample time (s) for them, of all models. `conditions`: see `joint_conditions`.
+    controllers for all models and the longest sample time (s) for them. `conditions` of joints by name: see
+    `joint_conditions`.
     """
 
     models: tuple[LinearModel, ...]
@@ -56,7 +57,7 @@ class LinearModels(Details):
 
     @property
     def advice(self) -> str:
-        """Gains for the motors to start with, as text; empty where none are known."""
+        """Text with first gains for the motors; empty where none are known."""
         if self.suggested is None:
             return ""
         gains, sample_time = self.suggested
@@ -93,13 +94,13 @@ class Linear(InstantAnalysis):
     refers_to = (("points", "body"),)
 
     def references(self) -> Iterator[Reference]:
-        """Yield references to points and to what is measured."""
+        """Yield references to points and to what `sensor` measures."""
         yield from super().references()
         for k, sensor in enumerate(self.sensor, 1):
             yield from under(f"sensor no. {k}", sensor.references())
 
     def run(self, context: ActuatedContext) -> Run:
-        """The operating points, with `LinearModels` about them. Raises `SolveError` in singular postures."""
+        """Return the operating points, with details `LinearModels`. Raises `SolveError` in singular postures."""
         run, about = find_operating_points(context, self)
         free = about.model
         linearization = LinearEquations(free, about.q[0], places_of(context, self.points))
@@ -127,7 +128,7 @@ class Linear(InstantAnalysis):
 
 
 def with_voltages(model: Model, mechanism: LinearMechanism, patches: Mapping[str, LinkPatches]) -> LinearMechanism:
-    """Return the mechanism with inputs "pzt/LAYOUT/k" behind its motors: generalized forces of 1 V along s."""
+    """Return the mechanism with inputs "pzt/LAYOUT/k" after its motors: generalized forces of 1 V."""
     found = {name: column for name, column in mechanism.inputs.items() if name.startswith("joint/")}
     for of_link in patches.values():
         along_s = model.modal_directions(of_link.per_volt) @ mechanism.transformation

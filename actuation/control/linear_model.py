@@ -112,10 +112,10 @@ class LinearModel(StateSpace):
 
     Attributes:
         state_names: "joint/NAME", "modal/BODY/k", … and their rates, "rate of joint/NAME", …
-        input_names: "joint/NAME" N·m (or N), "pzt/BODY/k" V, "force/BODY.POINT/x" N; k from 1.
-        output_names: "joint/NAME" rad (or m), "point/BODY.POINT/x" m, "modal/BODY/k"; of sensors as of `Signal`.
+        input_names: "joint/NAME" N·m (or N), "pzt/LAYOUT/k" V, "force/BODY.POINT/x" N; k from 1.
+        output_names: "joint/NAME" rad (or m), "point/BODY.POINT/x" m, "modal/BODY/k" m·√kg; of sensors as of `Signal`.
         mass: (f, f) mass matrix of s, SI units: the metric that compares coordinates of different kinds.
-        transformation: (coordinates, f) ∂q/∂s, which takes mode shapes to the robot.
+        transformation: (coordinates, f) ∂q/∂s from coordinates of the model to those of the robot.
     """
 
     mass: Array
@@ -141,12 +141,12 @@ class LinearModel(StateSpace):
 
     @cached_property
     def of_unit_mass(self) -> Array:
-        """L⁻ᵀ (f, f) with mass = L Lᵀ: s from coordinates z of unit mass."""
+        """L⁻ᵀ (f, f), SI, with mass = L Lᵀ: s = L⁻ᵀ z from coordinates z of unit mass."""
         return np.linalg.inv(np.linalg.cholesky(self.mass).T)
 
     @cached_property
     def second_order(self) -> tuple[Array, Array, Array, Array]:
-        """K̂ (f, f) rad²/s², D̂ (f, f) 1/s, inputs (f, …), outputs (…, f) for unit mass."""
+        """K̂ (f, f) rad²/s², D̂ (f, f) 1/s, B̂ (f, inputs) of z̈ + D̂ ż + K̂ z = B̂ u, and ∂y/∂z (outputs, f); SI units."""
         f, L_T, inverse = self.freedom, np.linalg.cholesky(self.mass).T, self.of_unit_mass
         A_K, A_D = L_T @ self.A[f:, :f] @ inverse, L_T @ self.A[f:, f:] @ inverse
         inputs, outputs = L_T @ self.B[f:], self.C[:, :f] @ inverse
@@ -167,7 +167,7 @@ def state_space(
 ) -> LinearModel:
     """Return the state space of a linear mechanism with sensors.
 
-    `readings` by name: derivatives (f,) of each output by s, ṡ and s̈.
+    `readings` are derivatives (f,) of outputs by coordinates s, ṡ and s̈, in SI units, by name of the output.
     """
     f, inputs = len(mechanism.M), mechanism.inputs
     modal = {name: row for name, row in zip(mechanism.names, np.eye(f), strict=True) if name.startswith("modal/")}
@@ -271,7 +271,7 @@ def robot_modes(model: LinearModel) -> RobotModes:
 
 @kept
 def locked_frequencies(model: LinearModel) -> Array:
-    """Return undamped frequencies (k,), Hz, the lowest first, with all motor shafts locked: of NᵀK̂ N, BᵀN = 0."""
+    """Return undamped frequencies (k,), Hz, the lowest first, with all motor shafts locked: of NᵀK̂ N with BᵀN = 0."""
     K, _, B, _ = model.second_order
     N = free_directions(B[:, model.inputs(model.motors)].T)
     omega = np.sqrt(np.linalg.eigvalsh(N.T @ (K + K.T) @ N / 2).clip(min=0.0))
@@ -382,10 +382,9 @@ def zeros(model: LinearModel, inputs: Names, outputs: Names) -> Zeros:
     """Return the zeros from as many inputs as outputs, by name (transmission zeros where more than one).
 
     While C z = 0 the inputs act as constraint forces: with bases N of C z = 0 and N_B of Bᵀ z = 0, zeros are the
-    eigenvalues of N_Bᵀ (λ² I + λ D̂ + K̂) N. Of the square pencil [A − λI, B; C, 0], all but its infinite eigenvalues of
-    relative degree two. QZ scatters those of higher degree: an eigenvalue whose distance from infinity is within the
-    error that round-off makes of it (G. W. Stewart and J. Sun, Matrix Perturbation Theory, 1990, VI.2) is infinite.
-    A transfer that is 0, or singular at all s, has none. Raises `InputError` unless both have the same number.
+    eigenvalues of N_Bᵀ (λ² I + λ D̂ + K̂) N. Infinite ones of the pencil, which QZ scatters, are those whose distance
+    from infinity is within their round-off (G. W. Stewart and J. Sun, Matrix Perturbation Theory, 1990, VI.2). A
+    transfer that is 0, or singular at all s, has none. Raises `InputError` unless both have the same number.
     """
     K, D, B, C = model.second_order
     b, c = B[:, model.inputs(inputs)], C[model.outputs(outputs)]
@@ -413,7 +412,7 @@ def zeros(model: LinearModel, inputs: Names, outputs: Names) -> Zeros:
 
 
 def by_side(values: ComplexArray, side: Array) -> NDArray[np.int_]:
-    """Return the order (k,) of `values` by their `side` of the imaginary axis, size, and imaginary part.
+    """Return the order (k,) of `values` (k,), any unit, by `side` of the imaginary axis (±1, 0), size, imaginary part.
 
     Sizes within `MARGIN` of each other count as one: those of conjugates, and of ± s, differ by round-off alone.
     """
@@ -459,19 +458,19 @@ def _finite(A: Array, E: Array, largest: float) -> tuple[ComplexArray, Array]:
 class SampledModel:
     """x(k+1) = A x(k) + B u(k) of a model with inputs that are constant between samples and act after a delay.
 
-    SI units. Commands that are on their way are states behind those of the model, oldest first.
+    SI units. Commands that wait for their delay are states after those of the model, oldest first.
     """
 
-    A: Array
-    B: Array
-    last: Indices  # (inputs,) states that are the commands which act until the sample
+    A: Array  # (states, states)
+    B: Array  # (states, inputs)
+    last: Indices  # (inputs,) indices of states that are the commands in effect just before the sample
 
 
 def sampled(A: Array, B: Array, T: float, delay: float | Array, *, with_last: bool = False) -> SampledModel:
     """Return the exact discrete model of x' = A x + B u, A (n, n), B (n, m), for samples every T (s).
 
-    See Åström and Wittenmark, Computer-Controlled Systems, sec. 2.3. `delay` (s) of all inputs, or of each.
-    `with_last`: without delay, too, the last command, which acts until the sample, is a state.
+    See Åström and Wittenmark, Computer-Controlled Systems, sec. 2.3. `delay` (s) is that of all inputs, or (m,) of
+    each. `with_last`: the last command, which acts until the sample, is a state also without delay. SI units.
     """
     n, m = B.shape
     late, fraction = np.divmod(np.broadcast_to(delay, m), T)
@@ -493,7 +492,7 @@ def sampled(A: Array, B: Array, T: float, delay: float | Array, *, with_last: bo
 
 
 def zero_order_hold(A: Array, B: Array, T: float) -> tuple[Array, Array]:
-    """Return e^{A T} (n, n) and ∫ e^{A s} ds B (n, m) over T (s), balanced, so that units of states do not matter."""
+    """Return e^{A T} (n, n) and ∫ e^{A s} ds B (n, m) over T (s) of A (n, n), B (n, m), in any units of states."""
     n, m = B.shape
     size = np.ones((n, 1))
     if n:
@@ -505,9 +504,10 @@ def zero_order_hold(A: Array, B: Array, T: float) -> tuple[Array, Array]:
 
 
 def riccati(A: Array, B: Array, Q: Array, R: Array, within: float = 1.0) -> Array:
-    """Return X (n, n) = AᵀXA − AᵀXB (R + BᵀXB)⁻¹ BᵀXA + Q for which A − B K is stable; for filters give Aᵀ and Cᵀ.
+    """Return X (n, n) = AᵀXA − AᵀXB (R + BᵀXB)⁻¹ BᵀXA + Q that stabilizes A − B K, K = (R + BᵀXB)⁻¹ BᵀXA.
 
-    Raises `ValueError` where there is none with eigenvalues of A − B K `within` that radius.
+    A and Q are (n, n), B (n, m), R (m, m), in consistent units; for filters use Aᵀ and Cᵀ. Raises `ValueError` where
+    no X has eigenvalues of A − B K `within` that radius.
     """
     root = np.linalg.cholesky(R)
     B = np.linalg.solve(root, B.T).T  # in the units of what is acceptable
@@ -524,10 +524,10 @@ def riccati(A: Array, B: Array, Q: Array, R: Array, within: float = 1.0) -> Arra
 
 
 def by_doubling(A: Array, B: Array, X: Array) -> Array | None:
-    """Return X (n, n) of `riccati` with R = 1, A (n, n), B (n, m), by doubling from Q, given as `X`.
+    """Return X (n, n) = AᵀXA − AᵀXB (1 + BᵀXB)⁻¹ BᵀXA + Q by doubling; A (n, n), B (n, m), argument `X` is Q (n, n).
 
-    Step k is 2ᵏ of the Riccati recursion (B. D. O. Anderson, Int. J. Control 28, 1978, 295–306). None where it does not
-    converge, or R is below round-off of Bᵀ X B.
+    Step k makes 2ᵏ of the Riccati recursion (B. D. O. Anderson, Int. J. Control 28, 1978, 295–306). None where it does
+    not converge, or 1 is below round-off of BᵀXB. Units are consistent.
     """
     unit, G = np.eye(len(A)), B @ B.T
     with np.errstate(all="ignore"), suppress(np.linalg.LinAlgError):

@@ -84,7 +84,8 @@ class Loop:
 class AmplifiedLoop:
     """Sampled loop with amplifiers, called at every step: motor commands, and mean voltages behind the amplifiers.
 
-    `directions` (k, n_v): current of the strain of each patch by v, A; `splits` part q, v, a of a state.
+    `directions` (k, n_v): current, A, by the strain of each of k patches, times v; `splits`: begin and end of v in a
+    state.
     """
 
     def __init__(
@@ -138,7 +139,7 @@ class AmplifiedLoop:
 def measure(run: LoopMotion, setup: Setup, loop: Loop, lowest: float, is_stable: bool | None) -> Metrics:
     """Return the metrics of a run; `lowest`: frequency of the robot with joints controlled or locked, Hz, or NaN.
 
-    `is_stable`: whether the sampled linear loop is stable; None if not known.
+    `is_stable` says whether the sampled linear loop is stable; None if not known.
     """
     t, motors = run.time, len(setup.robot.motors)
     distance = np.linalg.norm(run.error, axis=1)
@@ -177,18 +178,18 @@ class LoopRecord(Details):
     Attributes:
         inputs, outputs: names of commands and readings.
         time: (K,) s, of the samples taken.
-        readings: (K, outputs).
+        readings: (K, outputs) in units of the sensors: rad, m, V and their rates.
         reference: (K, outputs) readings on the reference motion.
-        commands: (K, inputs) within limits.
+        commands: (K, inputs) within limits, N·m, N or V.
         wanted: (K, inputs) before limits.
-        tip_error_peak_time: s, of the largest at all times.
+        tip_error_peak_time: s, when the tip error is largest.
         margins: by the linear model; None where controllers, or the robot, are not linear.
-        poles: of the linear loop at the start, from sample to sample.
+        poles: eigenvalues (n,) of the linear loop at the start, from sample to sample.
         warnings: one line each.
         advice: what to try, a text each, where the loop is not stable.
-        feedback: from readings to commands, off the reference, by time (s): at the start, or along a schedule.
+        feedback: controllers as a linear law about the reference, by time (s): at the start, or along a schedule.
         tip_error: (T,) m at the outputs of the run.
-        estimate: of an observer.
+        estimate: estimates of an observer; None without one.
     """
 
     inputs: tuple[str, ...]
@@ -210,16 +211,16 @@ class LoopRecord(Details):
 
 
 def between(times: Array, known: Array, values: Array) -> Array:
-    """Return values (K, columns) at `times` (K,) by a spline through those (T, columns) at times `known` (T,), s."""
+    """Interpolate `values` (T, columns), of any unit, from times `known` (T,) to `times` (K,), s, by a cubic spline."""
     if not values.size:
         return np.zeros((len(times), values.shape[1]))
     return scipy.interpolate.CubicSpline(known, values)(times)
 
 
 def held_commands(times: Array, samples: Array, delay: float, loop: Loop | AmplifiedLoop, after: float) -> Array:
-    """Return the commands (T, inputs) in effect `after` seconds past `times` (T,), s.
+    """Return the commands (T, inputs), N·m, N or V, in effect `after` seconds past `times` (T,), s.
 
-    Those of `samples` (K,), s, act `delay` (s) later.
+    A command of `samples` (K,), s, acts `delay` (s) later.
     """
     taken = slice(loop.taken)
     which = np.searchsorted(samples[taken] + delay, times + after, side="right")
@@ -229,7 +230,7 @@ def held_commands(times: Array, samples: Array, delay: float, loop: Loop | Ampli
 def times_of_run(outputs: Array, place_at: Callable[[Array], Array], lowest: float) -> tuple[Array, list[int]]:
     """Return times (T,), s, of a run: its outputs, and those at which vibration about `lowest` (Hz) is measured.
 
-    With the indices of the outputs among them. `place_at` as in `LoopMotion`.
+    The second result has indices of the `outputs` among them. `place_at` returns where the tip should be, m.
     """
     frequency, window = ringing(*resting(place_at, outputs), lowest)
     more = watched(float(outputs[-1]), window, frequency)
@@ -247,9 +248,9 @@ def loop_record(
     loops: Loops,
     lowest: float,
 ) -> LoopRecord:
-    """Return the record of a run at its outputs and between; linear `loops` about the reference.
+    """Return the record of a run under the controllers `acting`; linear `loops` about the reference have its margins.
 
-    `lowest`: as in `measure`.
+    `lowest`: frequency, Hz, of the robot with joints controlled or locked; NaN if nothing vibrates.
     """
     taken = slice(loop.taken)
     T, delay = analysis.sample_time, analysis.delay

@@ -1,11 +1,8 @@
-"""Stability of sampled loops by the linear model, and gains for joint PD controllers to start with. SI units.
+"""Stability of sampled loops by the linear model, and first gains of joint PD controllers. SI units.
 
-Commands are constant between samples and begin `delay` after their reading. With the model sampled exactly (Åström and
-Wittenmark, Computer-Controlled Systems, sec. 2.3) and the states of the controllers, the loop x(k+1) = F x(k) is stable
-where the spectral radius of F is below 1. Margins: by how much all commands, or the delay, may grow until it is 1.
-
-Suggested gains have a bandwidth well below the lowest vibration with locked motors, at most half of it by Craig
-(Introduction to Robotics, sec. 9.9), and critical damping of the rigid robot; the sampled loop must be stable.
+Commands are constant between samples and begin `delay` after their reading. With the exactly sampled model and the
+states of the controllers, the loop x(k+1) = F x(k) is stable where the spectral radius of F is below 1. Margins: by how
+much all commands, or the delay, may grow until it is 1.
 """
 
 from __future__ import annotations
@@ -36,16 +33,19 @@ RIGID = 1e-6  # of the fastest eigenvalue: slower ones are round-off of motion w
 
 @struct
 class Feedback:
-    """Discrete law of all controllers: ξ(k+1) = A ξ + B y, u = C ξ + D y, for deviations y from the reference."""
+    """Discrete law of all controllers: ξ(k+1) = A ξ + B y, u = C ξ + D y, for deviations y from the reference.
+
+    A (states, states), B (states, outputs), C (inputs, states), D (inputs, outputs) are in SI units.
+    """
 
     A: Array
     B: Array
     C: Array
     D: Array
-    # of commands and readings; a reading's rate is "NAME/rate"
+    # names of commands u and readings y; the rate of a reading is "NAME/rate"
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    # (2, inputs) time constants and further delays of commands behind amplifiers, s; None without
+    # (2, inputs) time constants and further delays of commands, s, by amplifiers; None without
     late: Array | None = None
 
     def times(self, factor: float) -> Feedback:
@@ -53,7 +53,10 @@ class Feedback:
         return replace(self, C=factor * self.C, D=factor * self.D)
 
     def behind(self, A: Array, B: Array, C: Array, D: Array) -> Feedback:
-        """Return the law behind discrete filters A (m, m), B, C, D of its readings, whose states come last."""
+        """Return the law with discrete filters A (m, m), B (m, p), C (p, m), D (p, p) of its p readings; SI units.
+
+        States of the filters come last.
+        """
         if not len(A):
             return self
         whole = np.block([[self.A, self.B @ C], [np.zeros((len(A), len(self.A))), A]])
@@ -83,7 +86,7 @@ class Margins:
 def joint_gains(model: LinearModel, records: Sequence[JointPid], T: float) -> Feedback:
     """Return the law of joint PID controllers, which add up, at samples every T (s).
 
-    −u = P y + D ẏ + D' (y − y₋)/T + I Σ T y with states y₋ and Σ T y.
+    −u = P y + D ẏ + D' (y − y₋)/T + I Σ T y with states y₋, the readings before, and Σ T y; D is of measured rates.
     """
     inputs = model.motors
     P, D, difference, integral = (np.zeros((len(inputs), len(model.output_names))) for _ in range(4))
@@ -117,8 +120,9 @@ def lowest_frequency(
 ) -> float:
     """Return the lowest frequency of the robot with controlled or locked joints, Hz; NaN if nothing vibrates.
 
-    The lowest with all motors locked and, where joints have PID controllers alone, of the sampled loop: its eigenvalues
-    e^{sT} that are damped by less than `LIGHTLY`. With others half of the lowest with motors locked.
+    It is the lowest with all motors locked and, where joints have PID controllers alone, of the sampled loop:
+    eigenvalues e^{sT} with damping ratios below `LIGHTLY`. With other controllers it is half of the lowest with motors
+    locked. `T` is the sample time, s, `delay` that of commands, s.
     """
     locked = min((float(locked_frequencies(model).min(initial=np.inf)) for model in models), default=np.inf)
     pids = [record for record in controllers if isinstance(record, JointPid)]
@@ -139,14 +143,14 @@ def lowest_frequency(
 
 
 def eigenvalue_count(loop: tuple[LinearModel, Feedback], T: float, delay: float) -> int:
-    """Return how many eigenvalues a sampled loop has: a long delay adds one for each command on its way."""
+    """Return how many eigenvalues a loop with sample time T (s) has: `delay` (s) adds states of waiting commands."""
     model, feedback = loop
     longest = delay + (0.0 if feedback.late is None else feedback.late[1].max(initial=0.0))
     return len(model.A) + len(feedback.A) + int(np.ceil(longest / T)) * len(feedback.inputs)
 
 
 def loop_eigenvalues(model: LinearModel, feedback: Feedback, T: float, delay: float) -> ComplexArray:
-    """Return eigenvalues (n,) of the sampled loop (times in s): plant, commands on their way, controller states."""
+    """Return eigenvalues (n,), from sample to sample, of the loop with sample time T and `delay` of commands, s."""
     late = None if feedback.late is None else tuple(map(tuple, feedback.late))
     plant, y = _plant(model, feedback.inputs, feedback.outputs, late, T, delay)
     F = np.block([[plant.A + plant.B @ feedback.D @ y, plant.B @ feedback.C], [feedback.B @ y, feedback.A]])
@@ -266,8 +270,9 @@ def suggested_gains(
     """Return PD gains for all motors to start with, for sample time T and `delay`, s; None where none are found.
 
     P = J ω² and D = 2 J ω, critical damping of the inertia J of each joint with rigid links and other joints locked,
-    the largest of the `models`. ω is a third of the lowest frequency with locked motors, with at least 30 samples a
-    period, and is reduced, `most_times`, until the sampled loops of all models are stable with twice the gains.
+    the largest of the `models`. ω is a third of the lowest frequency with locked motors (at most half: Craig,
+    Introduction to Robotics, sec. 9.9), with at least 30 samples a period, and is reduced, `most_times`, until the
+    sampled loops of all models are stable with twice the gains.
     """
     inertias = [joint_inertia(model) for model in models]
     known = [np.diag(inertia) for inertia in inertias if inertia is not None]
@@ -302,9 +307,9 @@ def unhurried_gains(models: Sequence[LinearModel]) -> tuple[Suggestion, float] |
 
 
 def light_roots(models: Sequence[LinearModel]) -> list[str]:
-    """Return joints with hardly any inertia at once: a torque turns the root of a bending link, not the link.
+    """Return joints where a torque first turns the root of a bending link, which has hardly any inertia, not the link.
 
-    1/(c M⁻¹ b) of the whole model against the joint's inertia with rigid links.
+    There 1/(c M⁻¹ b), of the joint's input b and output c, is small against the inertia with rigid links.
     """
     found: dict[str, None] = {}
     for model in models:
@@ -320,7 +325,10 @@ def light_roots(models: Sequence[LinearModel]) -> list[str]:
 
 
 def advice(loops: Loops, records: Sequence[JointPid], T: float, delay: float, found: Margins) -> list[str]:
-    """Explain why a loop is not stable; suggest gains if `records` of joint PID controllers are all controllers."""
+    """Explain why a loop with sample time T and `delay`, s, is not stable, a text each, by the margins `found`.
+
+    It suggests gains if `records` of joint PID controllers are all controllers.
+    """
     if np.isnan(found.gain):
         return [f"margins, and gains to start with, are not computed for a delay of {delay / T:.4g} samples"]
     models = [model for model, _ in loops]

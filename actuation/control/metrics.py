@@ -1,11 +1,7 @@
 """Metrics of a closed loop: error of the tip, settling, overshoot, vibration, effort: see `DEFINITIONS`.
 
-Vibration is measured in the last period of the lowest frequency that the robot has with its joints controlled or
-locked. Slower motion, a drift or an error that dies out, is the cubic of a least-squares fit of a cubic and one
-vibration to the last `PERIODS`: the cubic alone would take a part of the vibration for drift.
-
-The metrics are continuous in the motion, so that they do not depend on the steps of an integrator, which round-off
-decides. They are read at times independent of the steps (`watched`), and all fits count, by what they leave.
+They are continuous in the motion, so that they do not depend on the steps of an integrator, which round-off decides:
+they are read at times independent of the steps (`watched`), and all fits count, weighted by their residuals.
 """
 
 from collections.abc import Callable
@@ -45,13 +41,13 @@ DEFINITIONS = (
 
 @struct
 class Metrics:
-    """One run in numbers; see `DEFINITIONS`."""
+    """Metrics of one closed-loop run; see `DEFINITIONS`."""
 
     verdict: str  # see `verdict_of`
     # tip_error_rms, tip_error_max: distance of the tip from its place, m
     tip_error_rms: float
     tip_error_max: float
-    # s, after which that stays below 5 % of its largest value; NaN where it does not before the end
+    # s, after which this distance stays below 5 % of its largest value; NaN where it does not before the end
     settling_time: float
     vibration: float  # of the tip at the end of the run, peak to peak, m
     residual: float  # distance of the tip from its place at the end of the run, m
@@ -60,11 +56,11 @@ class Metrics:
     peak_moment: float  # N·m
     peak_voltage: float  # V
     saturated: float  # part of the samples at which a command is at its limit
-    # of the tip beyond its last place along the line from the first place to it, m
-    overshoot: float = np.nan  # these are not in files of version 0.1
+    # way of the tip beyond its final place along the line from the first place to it, m
+    overshoot: float = np.nan  # this field and those below are not in files of version 0.1
     # about which vibration is measured, Hz, see `ringing`; NaN where the linear model has none
     lowest_frequency: float = np.nan
-    vibration_window: float = np.nan  # before the end of the run, over which what is slower is found, s
+    vibration_window: float = np.nan  # time before the end of the run from which slower motion is fitted, s
 
 
 @struct
@@ -73,14 +69,14 @@ class LoopMotion:
 
     Attributes:
         time: (T,) s.
-        error: (T, d) m, of the tip from its place.
-        place_at: (T, d) m at times (T,), where the tip should be.
-        rates: (T, motors) rad/s, m/s.
-        held: (T, inputs) commands.
-        completed: whether it came to its end.
-        is_disturbed: by loads that the reference does not know.
-        quiet: s, from which on the reference rests and loads stay.
-        length: m, the size of the robot.
+        error: (T, d) m, of the tip from its place along d axes.
+        place_at: function from times (T,), s, to where the tip should be (T, d), m.
+        rates: (T, motors) of the joints, rad/s, m/s.
+        held: (T, inputs) commands in effect, N·m, N or V.
+        completed: whether the run reached its end.
+        is_disturbed: whether loads act that the reference does not know.
+        quiet: time from which the reference rests and loads stay constant, s.
+        length: size of the robot, m.
     """
 
     time: Array
@@ -97,8 +93,8 @@ class LoopMotion:
 def ringing(time: Array, place: Array, lowest: float) -> tuple[float, float]:
     """Return about which frequency (Hz) vibration is measured, and how long (s) before the end of `time` (T,), s.
 
-    `PERIODS` of the frequency `lowest`, Hz, within the time for which the `place` (T, d), m, of the tip rests, or in
-    half of the run where it does not rest. Where `LEAST_PERIODS`, or these, do not fit there, of the lowest that do.
+    The time has `PERIODS` of the frequency `lowest`, Hz, within the rest of the `place` (T, d), m, of the tip, or in
+    half of a run that does not rest. If too few fit (at rest `LEAST_PERIODS`), a higher frequency of which they fit.
     """
     whole = float(time[-1] - time[0])
     way = np.linalg.norm(place - place[-1], axis=1)
@@ -111,7 +107,7 @@ def ringing(time: Array, place: Array, lowest: float) -> tuple[float, float]:
 
 
 def resting(place_at: Callable[[Array], Array], time: Array) -> tuple[Array, Array]:
-    """Return even times (T,), s, over a run, and the place (T, d), m, of its tip there: for `ringing`."""
+    """Return evenly spaced times (T,), s, over `time`, and the place (T, d), m, of the tip there, for `ringing`."""
     even = np.linspace(time[0], time[-1], FINE + 1)
     return even, place_at(even)
 
@@ -126,9 +122,9 @@ def watched(end: float, window: float, lowest: float) -> Array:
 def vibration(time: Array, error: Array, window: float, lowest: float) -> float:
     """Return the peak-to-peak vibration (m) of `error` (T, d), m, in the last period of `lowest` (Hz).
 
-    Its slow part over the last `window` (s) of `time` (T,), s, is removed; `time` should have the times `watched`. That
-    is the mean of the least-squares cubics with one vibration each near `lowest` and of the cubic alone, weighted by a
-    power of what each leaves, so that the best decides (G. L. Bretthorst, Bayesian Spectrum Analysis, 1988, ch. 2).
+    Its slow part over the last `window` (s) of `time` (T,), s, is removed; `time` should have the times `watched`. The
+    slow part is the mean of least-squares cubics, each with one vibration near `lowest` or none, weighted by a power of
+    their residuals, so that the best decides (G. L. Bretthorst, Bayesian Spectrum Analysis, 1988, ch. 2).
     """
     if not window > 0.0:
         return 0.0
@@ -150,7 +146,10 @@ def vibration(time: Array, error: Array, window: float, lowest: float) -> float:
 
 
 def overshoot(time: Array, place: Array, error: Array) -> float:
-    """Return how far (m) the tip, at `place` + `error` (T, d), m, passes its final position along the line to it."""
+    """Return how far (m) the tip, at `place` + `error` (T, d), m, over `time` (T,), s, passes its final position.
+
+    The overshoot is along the line from the first place to the final one.
+    """
     way = place[-1] - place[0]
     length = float(np.linalg.norm(way))
     beyond = np.maximum((place + error - place[-1]) @ way, 0.0)
@@ -162,7 +161,7 @@ def _interpolated(times: Array, known: Array, values: Array) -> Array:
 
 
 def slow_part(t: Array, values: Array, window: float) -> Array:
-    """Return the part of `values` (T, columns), at even times t (T,), that is no vibration.
+    """Return the part of `values` (T, columns), of any unit, at even times t (T,), s, that is no vibration.
 
     Cubics over a `window` (s) (Savitzky and Golay 1964). By FFT: SciPy's filter takes a time that grows with T².
     """
@@ -214,14 +213,16 @@ def last_change(values_at: Callable[[Array], Array], time: Array) -> float:
 def verdict_of(
     run: LoopMotion, cut: Array, asked: tuple[Array, Array], lowest: float, is_stable: bool | None, *, is_seen: bool
 ) -> str:
-    """Return the verdict on linear loop and run; `cut` (K, inputs) is 1 and −1 where commands are at limits, else 0.
+    """Return the verdict on linear loop and run, which depends on the motion in the quiet time, when nothing changes.
 
     "diverges"; "oscillates at its limits": in the last quarter, in which commands are at limits, vibration does not
-    decay, or a command goes from one limit to the other; "grows": vibration, from quarter to quarter of a run without
-    disturbance (of its path and of the rest after it), or of the time in which nothing changes, or what is `asked`
-    then, by samples (K,) in s and the largest of their commands (K,), of the largest of all; "unstable (linear)"; "not
-    settled": in that time the tip does not come to rest, though sensors are exact; else "stable". `lowest` frequency
-    of the loop, Hz; `is_seen`: motion exceeds errors of sensors.
+    decay, or a command goes from one limit to the other; "grows": vibration from quarter to quarter (of path and rest
+    without disturbance, or of the quiet time), or commands in the quiet time; "unstable (linear)", by `is_stable`; "not
+    settled": the tip does not come to rest in the quiet time; else "stable".
+
+    `cut` (K, inputs) is ±1 where commands are at limits, else 0. `asked`: times (K,), s, of samples and their largest
+    command (K,), relative to the largest of all. `lowest` is the frequency, Hz, about which vibration is measured.
+    `is_seen`: the motion exceeds noise and resolution of the sensors, so that "not settled" is a finding.
     """
     if not run.completed:
         return "diverges"

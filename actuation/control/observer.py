@@ -1,10 +1,8 @@
 """Observers: estimates of what no sensor reads, by a sampled model of the robot about its reference. SI units.
 
-    x̂ = x̂⁻ + L (y − C x̂⁻),    x̂⁻(k+1) = A x̂ + B u + M (y − C x̂⁻)
-
-with y and u off the reference. A Kalman filter has M = 0 and, in its steady state, L = P Cᵀ (C P Cᵀ + R)⁻¹ with P from
-a Riccati equation (Anderson and Moore, Optimal Filtering, 1979, ch. 4); a predictor has L = 0. Commands on their way,
-which are known, and the filters of sensors are states of the model.
+A Kalman filter has M = 0 and, in its steady state, L = P Cᵀ (C P Cᵀ + R)⁻¹ with P from a Riccati equation (Anderson and
+Moore, Optimal Filtering, 1979, ch. 4); a predictor has L = 0. Commands that wait for their delay, which are known, and
+the filters of sensors are states of the model.
 """
 
 from __future__ import annotations
@@ -43,7 +41,10 @@ NAMED = 0.1  # of the largest entry of a vector of states
 
 @struct
 class Observer:
-    """Matrices of an observer with n states for a loop with p readings; SI units; see the module."""
+    """Matrices of an observer with n states for p readings y: x̂ = x̂⁻ + L (y − C x̂⁻), estimates E x̂; SI units.
+
+    From sample to sample x̂⁻ = A x̂ + B u + M (y − C x̂⁻) with commands u.
+    """
 
     A: Array  # (n, n)
     B: Array  # (n, inputs)
@@ -56,7 +57,7 @@ class Observer:
 
     @property
     def error(self) -> Array:
-        """Matrix F (n, n) of the estimation error x − x̂⁻ from sample to sample."""
+        """Matrix F (n, n), SI, of the estimation error x − x̂⁻ from sample to sample."""
         return self.A - (self.A @ self.L + self.M) @ self.C
 
     @property
@@ -71,7 +72,7 @@ class Observer:
         return replace(self, **mixed)
 
     def closed(self, inner: Feedback) -> Feedback:
-        """Return controllers on readings and estimates, with the observer, as a law from readings to commands.
+        """Return observer and controllers `inner` on readings and estimates as one law from readings to commands.
 
         Limits of commands are left out.
         """
@@ -93,10 +94,10 @@ def kalman(
     estimated: Sequence[str],
     sampling: tuple[Sequence[str], float, float],
 ) -> Observer:
-    """Return the steady-state filter of a model with the signals read, and those `estimated`, among its outputs.
+    """Return the steady-state Kalman filter of a model that has the signals `read` and `estimated` as outputs.
 
-    `sampling`: the names of commands, the sample time and the delay (s). Raises `InputError` for sensors without noise,
-    for noise that acts on no input of the model, and for motions that do not decay and that no sensor sees.
+    `sampling`: names of commands, sample time and delay (s). Raises `InputError` for sensors without noise, for noise
+    that acts on no input of the model, and for motions that do not decay and that no sensor sees.
     """
     inputs, T, delay = sampling
     names = [signal.name for signal in read]
@@ -166,9 +167,9 @@ def _covariance(A: Array, C: Array, Q: Array, R: Array, states: Sequence[str]) -
 
 
 def hidden(A: Array, C: Array, names: Sequence[str]) -> list[str]:
-    """Return names of states of x(k+1) = A x in motions that do not decay and that C x does not show.
+    """Return `names` of the n states of x(k+1) = A x in motions that do not decay and that readings C x do not show.
 
-    The test of Popov, Belevitch and Hautus, with states scaled first, as their units are arbitrary.
+    A is (n, n), C (p, n). By the test of Popov, Belevitch and Hautus, with states scaled, as their units are arbitrary.
     """
     found: dict[str, None] = {}
     A, (scale, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
@@ -185,7 +186,7 @@ def hidden(A: Array, C: Array, names: Sequence[str]) -> list[str]:
 
 
 def given(record: GainsObserver, setup: Setup) -> Observer:
-    """Return the observer of the scene's matrices. Raises `InputError` where they do not fit, or let errors grow."""
+    """Return the observer with the scene's matrices. Raises `InputError` where they do not fit, or let errors grow."""
     A, B, C, gain = (np.atleast_2d(np.array(of, dtype=float)) for of in record.matrices)
     n, m, p = len(A), len(record.inputs), len(record.outputs)
     for name, of, size in (("A", A, (n, n)), ("B", B, (n, m)), ("C", C, (p, n)), ("gain", gain, (n, p))):
@@ -233,7 +234,7 @@ class Schedule:
 
     @property
     def radius(self) -> float:
-        """The largest spectral radius of errors, at the times and half way between."""
+        """Largest spectral radius of the estimation error at the times and half way between."""
         halves = (self.times[1:] + self.times[:-1]) / 2
         return max(self.at(float(t)).radius for t in np.concatenate([self.times, halves]))
 
@@ -243,13 +244,14 @@ class Estimates:
     """Estimates at K samples, and tip error against the true motion.
 
     Attributes:
-        values: (K, names).
-        position: (K, d) m, estimated of the tip.
-        error: (K,) m, distance from the true position.
+        values: (K, names) estimates, SI units.
+        tip: point "BODY.POINT".
+        position: (K, d) m, estimated position of the tip.
+        error: (K,) m, distance of this from the true position.
         sigma: (K, d) m, standard deviations by the covariance of the filter.
-        nees: mean of eᵀ Σ⁻¹ e over the number of axes, 1 if the covariance is right.
+        nees: mean of eᵀ Σ⁻¹ e over the number of axes, e the error of the position; 1 if the covariance Σ is right.
         inside: part of the errors within ±2σ, 0.95 if the covariance is right.
-        poles: (n,) of the estimate's error, from sample to sample, at the start.
+        poles: (n,) eigenvalues of the estimation error, from sample to sample, at the start.
     """
 
     names: tuple[str, ...]
@@ -264,10 +266,10 @@ class Estimates:
 
 
 class Observed:
-    """Controllers with an observer, which the loop calls in their place.
+    """An observer and its controllers, which the loop calls as one controller; SI units.
 
-    `setup` is theirs, with estimates behind the readings; `origin`: readings (K, p) and commands (K, inputs) that the
-    model is about; `ranges` (2, inputs): limits of the commands that the observer knows.
+    `setup`: that of the controllers, with estimates after the p readings. `origin`: readings (K, p) and commands
+    (K, inputs) about which the model is linear. `ranges` (2, inputs): limits of the commands that the observer knows.
     """
 
     def __init__(
@@ -359,7 +361,7 @@ class Observed:
 
 
 def model_of_filter(record: FilterRecord, robot: ControlledRobot, row: int, signals: Sequence[Signal]) -> LinearModel:
-    """Return the linear model of a filter about output `row` of the robot's motion; `signals` are outputs.
+    """Return the linear model of a filter about output no. `row` of the robot's motion, with outputs `signals`.
 
     Its links have their lowest modes alone; forces that `record` names are inputs, too.
     """
@@ -398,8 +400,8 @@ def make_observed(
 ) -> Observed:
     """Make the observer with the controllers that act on its estimates.
 
-    `reference` (K, estimates) as in `Setup`, `ranges` (2, inputs) as in `Observed`, `nominal` (K, inputs): commands of
-    the reference; SI units. Raises `InputError` where the observer does not fit the robot.
+    `reference` (K, estimates): true values on the reference; `ranges` (2, inputs): limits of commands; `nominal`
+    (K, inputs): commands of the reference; SI units. Raises `InputError` where the observer does not fit the robot.
     """
     record, robot = analysis.observer, setup.robot
     tip, origin = analysis.tip or default_tip(robot.model), setup.reference

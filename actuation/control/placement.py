@@ -1,7 +1,6 @@
-"""The analysis `kind = "placement"`: the centers of patches on a link that do most. SI units.
+"""The analysis `kind = "placement"`: optimal centers of patches on a link. SI units.
 
-By what patches reach, by the voltages a path takes, or by what they tell of the tip. Mass and stiffness of patches,
-where the scene adds them to the link, stay where the scene has the patches.
+Mass and stiffness of patches, where the scene adds them to the link, stay where the scene has the patches.
 """
 
 from __future__ import annotations
@@ -45,18 +44,21 @@ SEED = 0  # of the evolution: the same scene gives the same patches
 
 @struct
 class PatchableLink:
-    """A link to place the patches of a layout on; p (m,), √kg·m, are what its patches can move of its modes."""
+    """A link on which patches are placed; p (m,), √kg·m, are coordinates of the modes that its patches excite."""
 
-    array: PatchArray  # of the layout, where the scene has its patches, on p
-    bodies: tuple[str, ...]  # whose modal coordinates are those of the link in linear models: itself, or its pieces
+    array: PatchArray  # patches of the layout where the scene has them, on p
+    bodies: tuple[str, ...]  # bodies with the modal coordinates of the link in linear models: itself, or its pieces
     own: Array  # (m, n) p from the modal coordinates of the `bodies`, side by side, as linear models have them
-    # patches by the keys "count" or "centers"; `InputError` where they do not fit the link
+    # function from keys "count" or "centers" to patches; raises `InputError` where they do not fit the link
     patches: Callable[..., PatchArray]
 
 
 @struct
 class Evaluation:
-    """A set of patches: centers (count,) m, reach (modes,) and the value of the criterion, which is maximized."""
+    """A set of patches: centers (count,), m, and the value of the criterion, which is maximized.
+
+    `reach` (modes,), without unit: controllability of each mode relative to that by the best single patch.
+    """
 
     centers: Array
     reach: Array
@@ -72,10 +74,10 @@ class Placed(Details):
     best: Evaluation
     even: Evaluation
     frequency: Array  # (modes,) Hz, of the modes that count
-    share: Array  # (modes,) of their strain energy, in the link
-    largest_voltage: Array  # (2,) V of best and even over the path; nan without one
+    share: Array  # (modes,) share of their strain energy that is in the link
+    largest_voltage: Array  # (2,) V of best and even over the path; nan without a path
     candidates: Array  # (k,) m, centers that were allowed
-    candidate_reach: Array  # (modes, k) of a single patch there
+    candidate_reach: Array  # (modes, k) `Evaluation.reach` of a single patch there
     sets: int  # how many sets of patches were compared
     method: str  # "all sets" or "evolution"
 
@@ -108,11 +110,11 @@ def place(
 ) -> Placed:
     """Find the best centers for the patches of a link.
 
-    By a `model` for controllability, modal forces F_p (T, m), N/√kg, for voltages, or the `deviation` (m) of the
-    estimated tip with patches that read (m, count) V per unit of p. Controllability of a mode is Σ (φᵀ b_k)² over the
-    patches, b_k the modal forces of a patch per volt, to which its gramian is proportional under light damping
-    (Gawronski, Advanced Structural Dynamics, 2004, ch. 4), relative to that of the best single patch: frequencies and
-    damping drop out. Raises `InputError` where there is no room.
+    The criterion needs a `model` (controllability), modal forces F_p (T, m), N/√kg (voltage), or the `deviation`, m, of
+    the estimated tip by readings (m, count), V/(m·√kg), of patches. Controllability of a mode is Σ (φᵀ b_k)² over the
+    patches, b_k the modal forces of a patch per volt, relative to the best single patch. The gramian is proportional
+    to it under light damping (Gawronski, Advanced Structural Dynamics, 2004, ch. 4). Raises `InputError` where there is
+    no room.
     """
     key, layout = f"{scene_path}: placement", link.array.layout
     stiffness, served = link.array.modes.stiffness, link.array.served
@@ -250,7 +252,7 @@ def _candidates(
 
 
 class EstimateRecord(FilterRecord):
-    """The Kalman filter whose estimate of the tip placed patches serve, as sensors."""
+    """Kalman filter that estimates the tip by the placed patches as sensors."""
 
     sample_time: Positive
     """Time between readings, s."""
@@ -267,7 +269,7 @@ class EstimateRecord(FilterRecord):
         return self
 
     def references(self) -> Iterator[Reference]:
-        """Yield references to what is measured, pushed and estimated."""
+        """Yield references to sensors, loads and the tip."""
         for k, sensor in enumerate(self.sensor, 1):
             yield from under(f"sensor no. {k}", sensor.references())
         yield from super().references()
@@ -334,7 +336,7 @@ class PatchPlacement(InstantAnalysis):
 
     @property
     def needs_times(self) -> bool:
-        """Whether it needs an instant to place patches for: not where a criterion counts the whole motion."""
+        """Whether patches are placed for an instant of `about`, not for its whole motion."""
         return not self.is_over_path
 
     def references(self) -> Iterator[Reference]:
@@ -342,7 +344,7 @@ class PatchPlacement(InstantAnalysis):
         yield from self.placement.references()
 
     def problems(self, among: Surroundings) -> Iterator[str]:
-        """Check that the analysis placed for has the modal forces or the model that the criterion needs."""
+        """Yield a message, a line each, if `about` lacks the modal forces or the model that the criterion needs."""
         if not self.is_over_path:
             if self.instants is not None and len(self.instants) != 1:
                 yield f"times: expected one time to place patches for, found {len(self.instants)}"
@@ -357,7 +359,7 @@ class PatchPlacement(InstantAnalysis):
         yield from super().problems(among)
 
     def run(self, context: ActuatedContext) -> Run:
-        """Solve for the operating points, and place the patches by them; the details of the run are `Placed`.
+        """Find the operating points, and place the patches by them; the details of the run are `Placed`.
 
         Other layouts of the link stay where they are. Raises `InputError` unless the layout is known and has room.
         """

@@ -95,7 +95,7 @@ class Sensor(Referring):
         return float(np.hypot(self.noise, self.noise_density / np.sqrt(2 * T)))
 
     def references(self) -> Iterator[Reference]:
-        """Yield references to what is measured; points of strain belong to the link file."""
+        """Yield references to the measured joint, point, layout or body; points of strain belong to the link file."""
         yield from super().references()
         if self.strain is not None:
             link = self.strain.partition(".")[0]
@@ -103,7 +103,10 @@ class Sensor(Referring):
 
 
 def check_sampling(sensors: Sequence[Sensor], T: float, whose: str, *, at_every_sample: bool) -> None:
-    """Raise `ValueError` for delays and sample times that are no multiples of T (s), or longer if `at_every_sample`."""
+    """Raise `ValueError` for delays and sample times of sensors that are no multiples of the sample time T, s.
+
+    `at_every_sample`: also for sample times that are not T. `whose` names T in the message.
+    """
     for k, sensor in enumerate(sensors, 1):
         for key in ("delay", "sample_time"):
             samples = (getattr(sensor, key) or 0.0) / T
@@ -145,7 +148,7 @@ class FilterRecord(Record):
 
     @property
     def points(self) -> dict[str, str]:
-        """Points "BODY.POINT" at which forces are inputs, each by its own name."""
+        """Points "BODY.POINT" at which forces are inputs, as keys and values."""
         return {reference.name: reference.name for reference in FilterRecord.references(self)}
 
     def references(self) -> Iterator[Reference]:
@@ -218,7 +221,10 @@ class GainsObserver(ObserverRecord):
 
     @property
     def matrices(self) -> tuple[Any, Any, Any, Any]:
-        """A (n, n), B (n, inputs), C (outputs, n), gain (n, outputs); raises `InputError` where the file lacks one."""
+        """A (n, n), B (n, inputs), C (outputs, n), gain (n, outputs), in units of the scene or file.
+
+        Raises `InputError` where the file lacks one.
+        """
         if self.file is None:
             return self.A, self.B, self.C, self.gain
         from .linear_model import read_arrays
@@ -235,7 +241,7 @@ class ControllerRecord(Referring):
 
 
 class JointPid(ControllerRecord):
-    """u = P e + D ė + I ∫e of each joint named, e from the reference; N·m/rad, N·m·s/rad, N·m/(rad·s) or their like."""
+    """u = P e + D ė + I ∫e for each joint, e its error from the reference; N·m/rad, N·m·s/rad, N·m/(rad·s); N, m."""
 
     kind: Literal["joint-pid"]
     proportional: dict[Name, NotNegative] = Field(default_factory=dict)
@@ -338,7 +344,7 @@ def _python_function(value: object, info: ValidationInfo) -> object:
 
 
 class PythonController(ControllerRecord):
-    """A user's function: "FILE.py:FUNCTION" next to the scene, or the function itself in scenes made in Python."""
+    """A user's function as controller."""
 
     kind: Literal["python"]
     python: Annotated[Any, ReadBy(_python_function, str)]
@@ -417,7 +423,7 @@ class SampledAnalysis(ActuatedAnalysis):
         return self
 
     def needs(self) -> Iterator[Need]:
-        """Patches where voltages are fed forward."""
+        """Yield the need of a table [[pzt]] where voltages are fed forward."""
         if self.feed_forward == "joints+pzt":
             yield Need("feed_forward", self.feed_forward, "pzt")
 
@@ -434,13 +440,13 @@ class SampledAnalysis(ActuatedAnalysis):
             yield Reference("tip", self.tip)
 
     def prescribed(self) -> Iterator[tuple[str, TimeFunction, int]]:
-        """Yield label, function of time and order of derivatives needed, 0, of each component of disturbances."""
+        """Yield label, function of time and number of derivatives needed, 0, of each component of disturbances."""
         for k, load in enumerate(self.disturbance, 1):
             for component, function in load.components.items():
                 yield f"disturbance no. {k}: {component}", function, 0
 
     def replay_problems(self, source: Analysis) -> Iterator[str]:
-        """Check that `source` has the inputs to feed forward, and exists before a controller is designed."""
+        """Yield a message, a line each, if `source` lacks inputs to feed forward, or ends before a design's instant."""
         designed = [(f"controller no. {k}", record) for k, record in enumerate(self.controller, 1)]
         for label, record in (*designed, ("observer", self.observer)):
             if isinstance(record, Lqr | KalmanObserver) and record.time > source.last_time * (1 + 1e-9):

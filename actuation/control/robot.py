@@ -1,4 +1,4 @@
-"""What controllers ask of a robot: names, sensors, links, patches, linear and rigid models, what they are made with."""
+"""Robots as controllers use them: names, sensors, links, patches, linear and rigid models, and the setup."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -32,15 +32,15 @@ from .signals import check_joint, volts_on_file
 
 
 def rigid_freedom(model: Model) -> int:
-    """Return the degrees of freedom of the mechanism with rigid links in its initial posture, with those of gears."""
+    """Return the number of DOF of the mechanism with rigid links in its initial posture, with those of gears."""
     return mobility(model, undeformed_posture(model).q).freedom + len(model.tree.gears)
 
 
 class RigidArm:
-    """Torques τ(γ, γ̇, γ̈), SI, of all motors with rigid links, by the core, rotors and friction too, without loads.
+    """Robot with rigid links: torques τ(γ, γ̇, γ̈), SI, of all motors, with rotors and friction, without loads.
 
-    They are the multipliers of γ = γ(t), affine in γ̈: one evaluation with γ̈ = 0, one for each motor. `q` (n_q,): the
-    first configuration of `model`. Raises `InputError` where the motors do not fit.
+    They are the multipliers of γ = γ(t), affine in γ̈: one evaluation with γ̈ = 0, one for each motor. `q` (n_q,), m and
+    rad: the first configuration of `model`. Raises `InputError` where the motors do not fit its DOF.
     """
 
     def __init__(self, model: Model, q: Array) -> None:
@@ -76,9 +76,10 @@ class RigidArm:
         return np.diag(np.linalg.inv(self.terms(angles, np.zeros_like(angles))[0]))
 
     def place(self, gamma: Array) -> tuple[Array, Array]:
-        """Move to motor angles `gamma` (motors,), rad or m, from the last place; return coordinates q (n_q,) and C_v.
+        """Move from the last posture to motor angles `gamma` (motors,), rad or m.
 
-        Raises `SolveError` where the links do not reach these angles.
+        Return coordinates q (n_q,) and the Jacobian C_v (constraint equations, n_v), SI. Raises `SolveError` where the
+        links do not reach these angles.
         """
         beside, now = np.zeros((1, len(self._model.rows))), np.zeros(1)
         beside[0, self._motors] = gamma
@@ -127,20 +128,20 @@ def _rigid(body: Body) -> Body:
 
 @struct
 class PatchSignals:
-    """The k patches of one link, and the m coordinates of it that they are to serve, the lowest first."""
+    """The k patches of one link, and the m uncoupled modal coordinates that they excite, the lowest first."""
 
-    inputs: tuple[str, ...]  # names of their voltages and of their readings
-    omega: Array  # (m,) rad/s of these coordinates
+    inputs: tuple[str, ...]  # names of the patches' voltages, which are those of their readings, too
+    omega: Array  # (m,) rad/s, natural frequencies of these coordinates
     gain: Array  # (k, m) V√kg/N, voltages per force on each of these coordinates
-    volts: Array  # (k, m) V/(m·√kg), readings per unit of each
-    own: Array  # (m, n) these coordinates from all modal coordinates p of the link
+    volts: Array  # (k, m) V/(m·√kg), readings per unit of each coordinate
+    own: Array  # (m, n) these coordinates from all n modal coordinates p of the link
 
 
 @struct
 class ControlledRobot:
     """Robot, SI units, with motors and patches on the motion of an inverse analysis, about which it is linearized."""
 
-    model: Model  # its constraint equations are those of loops alone, its gears do not give: see `linear`
+    model: Model  # with constraint equations of loops alone, and with rigid gears
     of_links: Mapping[str, LinkPatches]  # patches by link
     source: Run  # the inverse analysis
 
@@ -171,7 +172,7 @@ class ControlledRobot:
 
     @property
     def motors_fit(self) -> bool:
-        """Whether there are as many motors as the mechanism with rigid links has freedom."""
+        """Whether there are as many motors as the mechanism with rigid links has DOF."""
         return len(self.motors) == rigid_freedom(self.model)
 
     @cached_property
@@ -197,7 +198,10 @@ class ControlledRobot:
         return signals
 
     def linear(self, row: int, points: Mapping[str, str] = MappingProxyType({})) -> LinearMechanism:
-        """Linearize about output `row` of the motion, with `points` as in `LinearEquations`; voltages are inputs."""
+        """Linearize about output no. `row` of the motion; motors, voltages and forces at `points` are inputs.
+
+        `points`: where each "BODY.POINT" is in the model.
+        """
         moved = with_motor_coordinates(self.source, self.plant)
         linearisation = LinearEquations(self.plant, moved.q[row], points)
         found = linearisation.at(float(self.source.time[row]), moved.q[row], moved.v[row], moved.a[row])
@@ -209,7 +213,7 @@ class ControlledRobot:
 
 
 def whole_robot(context: ActuatedContext, source: Run) -> ControlledRobot:
-    """Return the robot of an analysis about the motion `source`, with whole links also where the plant has pieces."""
+    """Return the robot of an analysis about the motion `source`, with whole links in place of subdivided ones."""
     if context.whole is None:
         return ControlledRobot(context.model.without_paths(), context.patches, source)
     return ControlledRobot(context.whole.model.without_paths(), context.patches, context.whole.as_links(source))
@@ -222,9 +226,9 @@ def input_names(robot: ControlledRobot) -> tuple[str, ...]:
 
 
 def estimate(volts: Array, count: int) -> Array:
-    """Return the matrix (count, k), m·√kg/V, from patch readings to estimates of coordinates, by `volts` (k, m).
+    """Return the matrix (count, k), m·√kg/V, from readings of k patches to estimates of the lowest coordinates.
 
-    `volts`: readings per unit of each coordinate.
+    `volts` (k, m), V/(m·√kg): readings per unit of each coordinate.
     """
     return np.linalg.pinv(volts[:, : min(volts.shape)])[:count]
 
@@ -282,15 +286,15 @@ class Setup:
     """Data for making a controller; SI units.
 
     Attributes:
-        model: its equations of motion.
-        patches: by body.
-        inputs, outputs: names of commands (torques N·m or N, voltages V) and readings, as `signals` names them.
+        model: equations of motion of the plant.
+        patches: patches by body.
+        inputs, outputs: names of commands (torques N·m or N, voltages V) and readings, as `Signal` has them.
         times: (K,) of the samples, s.
         sample_time: s.
         delay: s, after which a command acts.
-        reference: (K, outputs) what the sensors would read on the motion of `source`.
-        feed_forward: (K, inputs) what is commanded anyhow.
-        source: of the inverse analysis.
+        reference: (K, outputs) readings of the sensors on the motion of `source`.
+        feed_forward: (K, inputs) commands to which those of controllers are added.
+        source: run of the inverse analysis.
     """
 
     robot: ControlledRobot
@@ -306,7 +310,7 @@ class Setup:
     source: Run
 
     def robot_coordinates(self, joints: Iterable[str]) -> Iterator[tuple[str, str]]:
-        """Yield joints with the names of their coordinates, one after the other."""
+        """Yield each joint with the name of each of its coordinates: "NAME", or "NAME 1", "NAME 2"."""
         for joint in joints:
             yield from ((joint, name) for name in self.robot.coordinates(joint))
 

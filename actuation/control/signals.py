@@ -27,7 +27,7 @@ STEP = 2.0**-13  # of differences of readings of points, in rad, m, √kg·m and
 
 @struct
 class Signal:
-    """One reading: the coordinate `axis` (0, 1, 2) of a `point`, or `along` (n_v,) times joint and modal coordinates.
+    """One reading, SI: coordinate `axis` (0, 1, 2) of a `point`, or `along` (n_v,) times joint and modal coordinates.
 
     `name`: "joint/NAME", "motor/NAME", "point/BODY.POINT/x" or y or z, "strain/BODY.POINT", "pzt/LAYOUT/k",
     "modal/BODY/k" (k from 1), followed by "/rate", … where that is measured.
@@ -46,7 +46,7 @@ class Signal:
 
 
 class Sensing:
-    """Readings of signals in the states of a model."""
+    """Readings of signals in states of a model; SI units."""
 
     def __init__(self, model: Model, read: Sequence[Signal]) -> None:
         tree = model.tree
@@ -117,7 +117,7 @@ class Sensing:
 def readings_at(
     model: Model, mechanism: LinearMechanism, read: Sequence[Signal]
 ) -> dict[str, tuple[Array, Array, Array]]:
-    """Changes (f,) of each reading by s, ṡ and s̈ of a linear mechanism of `model`, by name."""
+    """Return derivatives (f,), SI, of each reading by s, ṡ and s̈ of a linear mechanism of `model`, by name."""
     rows = zip(*Sensing(model, read).rows(mechanism), strict=True)
     return dict(zip([signal.name for signal in read], rows, strict=True))
 
@@ -125,7 +125,7 @@ def readings_at(
 def make_signals(
     model: Model, context: ActuatedContext, sensors: Iterable[Sensor], whole: WholeLinks | None = None
 ) -> list[Signal]:
-    """Return the readings of sensors of the scene; `whole`: the links that are in pieces in the model.
+    """Return the readings of sensors of the scene, in order; `whole`: links that the model has subdivided.
 
     Raises `InputError` for a joint without coordinates in the tree, and for strain where the link has no such point.
     """
@@ -167,9 +167,9 @@ def _of_sensor(model: Model, context: ActuatedContext, sensor: Sensor, whole: Wh
 
 
 def filters(read: Sequence[Signal], T: float) -> tuple[Array, Array, Array, Array]:
-    """Return discrete A (m, m), B, C, D (p, p) of step T, s, from true values to p readings.
+    """Return discrete A (m, m), B (m, p), C (p, m), D (p, p) from true values to p readings, in the unit of each.
 
-    High-pass filters, exact for values that change linearly between samples, then delays.
+    High-pass filters, exact for values that change linearly between samples every T (s), come before delays.
     """
     p = len(read)
     A, B, C, D = np.zeros((0, 0)), np.zeros((0, p)), np.zeros((p, 0)), np.eye(p)
@@ -230,7 +230,7 @@ def _modal_coordinates(model: Model, link: str, whole: WholeLinks | None) -> Arr
 
 
 def volts_on_file(of_link: LinkPatches, layout: str, capacitance: float | None = None) -> dict[str, Array]:
-    """Return patch readings (k, n), V/(m·√kg), per unit of the modes of the file of each body.
+    """Return readings (k, n), V/(m·√kg), of the k patches of a layout per unit of n modes of the file, by body.
 
     A patch reads its charge over its `capacitance`, F. By reciprocity the charge of a deflection is the modal force of
     a voltage, Φ_Vᵀ p (Lee and Moon, J. Appl. Mech. 57, 1990). A patch that also drives the link is read through a

@@ -1,1 +1,1 @@
-"""Piezoelectric patches: what they do per volt, the voltages, what they add to their link."""
+"""Piezoelectric patches: modal forces per volt, voltages, and the mass and stiffness that they add to a link."""

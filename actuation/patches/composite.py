@@ -2,21 +2,21 @@
 
 Under the strains e = (φ_z', u', φ_x', −φ_y') of the axis and a voltage V the layers at one place take the loads
 
-    P = f V − C e          (`layers`; in the plane e = (φ', u'), C = E_p [[I, −S], [−S, A]], f = (c, ∓E_p d31 w N))
+    P = f V − C e     (`layer_loads`; in the plane e = (φ', u'), C = E_p [[I, −S], [−S, A]], f = (c, ∓E_p d31 w N))
 
-(Crawley and de Luis, AIAA J. 25, 1987, 1373–1385). The modes of the link have not the steps of curvature at the ends of
-patches. What they lack is static and known: of a link that is held isostatically, a load in one section strains that
-section alone, by 1/EI, 1/EA, 1/GJ, of which the modes, with strains B p, have B K⁻¹ Bᵀ. At Gauss points of weights w,
-with C and f for the length w of each,
+(Crawley and de Luis, AIAA J. 25, 1987, 1373–1385). The modes lack the steps of curvature at the ends of patches. These
+residual strains are static and known: a load in one section of an isostatic link strains that section alone, by 1/EI,
+1/EA, 1/GJ, of which the modes, with strains B p, have B K⁻¹ Bᵀ. At Gauss points of weights w, with C and f for the
+length w of each,
 
     e = B p + R P,    R = diag(1/(w EI), 1/(w EA) …) − B K⁻¹ Bᵀ,    P = (1 + C R)⁻¹ (f V − C B p)
 
 so that the patches add the stiffness Bᵀ (1 + C R)⁻¹ C B to the link and have the modal forces Bᵀ (1 + C R)⁻¹ f V.
-Layouts of one link feel each other through its modes, and are taken together.
+Layouts of one link are coupled by its modes.
 
-Patches that bend (or twist) and name no face do that alone: on one face, where the section is free in all else, which
-shifts the neutral axis, but no other mode feels them. On named faces all strains of the section feel them: those on one
-face stretch the link, too, and those off the middle of the width bend it about both axes.
+Patches without a named face only bend (or twist): they are on one face, and all other strains of the section are free,
+which shifts the neutral axis. On named faces they interact with all strains: those on one face stretch the link, too,
+and those off the middle of the width bend it about both axes.
 """
 
 from collections.abc import Iterator, Sequence
@@ -57,14 +57,14 @@ GAUSS_POINTS = 4  # products of the cubics of an element are of degree 6
 
 
 class PlacedLayout(NamedTuple):
-    """A layout with its patches between `edges` (k, 2), m."""
+    """A layout with the begin and end of its k patches, `edges` (k, 2), m from the root of the link."""
 
     layout: PztLayout
     edges: Array
 
 
 class GaussPoint(NamedTuple):
-    """A place x (m) in interval number `interval`, its weight (m), and the station whose section holds there."""
+    """Gauss point at x (m from the root) in interval no. `interval`, its weight (m), index of the station before it."""
 
     interval: int
     x: float
@@ -75,8 +75,9 @@ class GaussPoint(NamedTuple):
 def composite(placed: Sequence[PlacedLayout], body: ModalBody) -> tuple[Array, Array, Array]:
     """Return the mutual effects of the k patches of all layouts and their link, over n modes of the modal body.
 
-    The stiffness (n, n), rad²/s², that patches add; modal forces per volt (k, n), N/(√kg·V), that the layers' own
-    stiffness takes of those on a link held straight; `LayersOnLink.yielding`. R is 0 where rigidities are not known.
+    These are the stiffness (n, n), rad²/s², that patches add; modal forces per volt (k, n), N/(√kg·V), by which the
+    layers' stiffness reduces those on a straight link; and what residual strains add to capacitances (k,), F, which is
+    0 where rigidities are not known.
     """
     layers = layers_on_link(placed, body)
     stiffness, per_volt = layers.B.T @ layers.by_modes, layers.by_volts.T @ layers.B
@@ -84,9 +85,9 @@ def composite(placed: Sequence[PlacedLayout], body: ModalBody) -> tuple[Array, A
 
 
 def section_loads(placed: PlacedLayout, body: ModalBody, p: Array, voltages: Array) -> SectionLoads:
-    """Return P per length of the link over a motion, N and N/m, of patches that bend in the plane.
+    """Return moments, N·m, and axial forces, N, of patches that bend a link in the plane on its sections.
 
-    By p (T, n) on the modes of the body's file, m·√kg, and voltages (T, k), V.
+    The motion is p (T, n), m·√kg, on the modes of the body's file, under voltages (T, k), V.
     """
     layers = layers_on_link([placed], body)
     P = voltages @ layers.by_volts.T - p @ layers.by_modes.T
@@ -99,10 +100,11 @@ def section_loads(placed: PlacedLayout, body: ModalBody, p: Array, voltages: Arr
 
 
 class LayersOnLink(NamedTuple):
-    """Layers on their link, of each Gauss point a row for each strain of e that is felt anywhere.
+    """Layers of k patches on their link with n modes: for each Gauss point a row for each strain that interacts.
 
-    B (rows, n); P of coordinates p and of voltages: `by_modes` (rows, n) taken off, `by_volts` (rows, k); `straight`
-    (rows, k) of a volt on a link held straight. `yielding` (k,): what the residual strains add to capacitances, F.
+    B (rows, n): strains of the modes, SI. Loads times weights of points are P = `by_volts` (rows, k) V − `by_modes`
+    (rows, n) p, N·m² and N·m; on a straight link `straight` (rows, k) V. `yielding` (k,): what residual strains, which
+    modes lack, add to capacitances, F.
     """
 
     points: list[GaussPoint]
@@ -114,7 +116,7 @@ class LayersOnLink(NamedTuple):
 
 
 def layers_on_link(placed: Sequence[PlacedLayout], body: ModalBody) -> LayersOnLink:
-    """Return the effects of the layers of all layouts on their link."""
+    """Return the loads of the layers of all layouts on their link."""
     sections = link_sections(body)
     intervals, covering = _intervals(placed)
     points = list(gauss_points(body, intervals))
@@ -171,7 +173,7 @@ def stiffness_ratios(placed: PlacedLayout, body: ModalBody) -> tuple[Array, Arra
 
 
 def gauss_points(body: ModalBody, intervals: Array) -> Iterator[GaussPoint]:
-    """Yield Gauss points along `intervals` (m, 2), m; none spans a station: shapes have kinks there, sections steps."""
+    """Yield Gauss points along `intervals` (m, 2), m, split at stations, where shapes have kinks and sections steps."""
     nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)  # type: ignore[no-untyped-call, unused-ignore]
     stations = body.stations.position[:, 0]
     for number, (start, end) in enumerate(intervals.clip(0.0, body.length)):
@@ -184,15 +186,19 @@ def gauss_points(body: ModalBody, intervals: Array) -> Iterator[GaussPoint]:
 
 
 def place_of(layout: PztLayout, sections: LinkSections, station: int) -> tuple[float, float]:
-    """Return the extent along the patches' normal (m), of their face, and the ratio β of `shear_lever` at a station."""
+    """Return the link's extent along the normal of its patches (m), see `LinkSections.extent`, and β at a station.
+
+    β is `LinkSections.shear_lever`, without unit; 0 where the layers carry no shear.
+    """
     lever = sections.shear_lever(station, layout.normal, layout.width) if layout.lamina.shears else 0.0
     return float(sections.extent(layout.normal, side(layout))[station]), lever
 
 
 def felt_loads(layout: PztLayout, sections: LinkSections, station: int) -> tuple[Array, Array]:
-    """Return C (4, 4) and f (4,) of `layer_loads` in the rows that feel them, else 0; in these the section is free.
+    """Return C (4, 4) and f (4,), SI, of `layer_loads` for strains e_f that interact with patches; others d are free.
 
-    Free means that link and layers together carry nothing there: e_d = (C_l + C)_dd⁻¹ (f_d V − C_df e_f), eliminated.
+    Link and layers together carry no load along these: e_d = (C_l + C)_dd⁻¹ (f_d V − C_df e_f) is eliminated, with 0 in
+    C and f.
     """
     every, of_volt = layer_loads(layout, *place_of(layout, sections, station))
     felt = felt_rows(layout)
@@ -208,10 +214,7 @@ def felt_loads(layout: PztLayout, sections: LinkSections, station: int) -> tuple
 
 
 def _intervals(placed: Sequence[PlacedLayout]) -> tuple[Array, list[list[tuple[PztLayout, int]]]]:
-    """Stretches (m, 2) of the link with the same patches on each, and which: layouts with numbers of their patches.
-
-    Patches are numbered through the layouts. Those of one layout lie beside each other and are the stretches.
-    """
+    """Stretches (m, 2) of the link with the same patches on each, and which: layouts with numbers of their patches."""
     edges = np.concatenate([edges for _, edges in placed])
     owners = [layout for layout, of_layout in placed for _ in of_layout]
     if len(placed) == 1:
@@ -248,11 +251,11 @@ class Effects(NamedTuple):
     """Effects of k patches on the n modes of a modal body.
 
     Attributes:
-        extent: (k,) t_b, of the link along their normal under each patch, its mean, m: see `LinkSections.extent`.
-        per_volt: (k,) c, the load along the strain that each actuates, N·m/V.
-        lever: (k,) strain of the surface by unit curvature and distance; by twist, β/2, of its diagonals.
-        turn: (k, n) by how much the sections at the patch's ends turn against each other in its own sense, rad.
-        Phi_V: (k, n) modal forces per volt, less what the layers' own stiffness takes.
+        extent: (k,) t_b, mean extent of the link along the normal under each patch, m: see `LinkSections.extent`.
+        per_volt: (k,) c, load along the strain that each patch actuates, N·m/V.
+        lever: (k,) strain of the surface per curvature and distance: 1; of its diagonals per twist: β/2.
+        turn: (k, n) rotation of the sections at the ends of a patch against each other, in its sense, rad/(m·√kg).
+        Phi_V: (k, n) modal forces per volt, N/(√kg·V), reduced by the stiffness of the layers.
         yielding: (k,) what strains that modes lack add to the capacitance, F.
     """
 
@@ -265,7 +268,7 @@ class Effects(NamedTuple):
 
 
 def effects(key: str, placed: Sequence[PlacedLayout], body: ModalBody) -> list[Effects]:
-    """Return the effects of one link's layouts, coupled by their stiffness if it counts."""
+    """Return the effects of each layout of one link, coupled by their stiffness if it counts; `key` begins messages."""
     found = [_straight(key, one, body) for one in placed]
     stiff = [k for k, one in enumerate(placed) if one.layout.adds_stiffness]
     if not stiff:
@@ -400,7 +403,7 @@ class StructureEffect:
 
 
 def patched_body(spatial: Body, body: ModalBody, placed: Sequence[PlacedLayout]) -> Body:
-    """Add mass and stiffness of patches to a link or a piece of it, as the layouts ask; all modes are kept.
+    """Add mass and stiffness of patches to a link or a piece of it, by the key `structural`; all modes are kept.
 
     Mass lies in the plane of the patches' normal at their offset from the axis, with its moment of inertia about the
     line that it is on, ∫ρ (η² + ζ²) dA. The stiffness is that of the `composite` section.

@@ -1,8 +1,7 @@
-"""Patches of a link: several layouts side by side, their reach, and voltages that they find together. SI units.
+"""Patches of a link: several layouts side by side, and the voltages for all of them together. SI units.
 
-Patches serve the modes of the families that some patch reaches: in-plane bending by patches on ±y, out-of-plane bending
-by those on ±z, torsion by fibers at an angle, the axial family by one named face. Voltages leave the modal forces on
-other families unmet.
+They serve the families of modes that some patch excites: in-plane bending (patches on ±y), out-of-plane bending (±z),
+torsion (fibers at an angle), axial modes (one named face). Modal forces on other families are unmet.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -45,9 +44,9 @@ class OnBody:
     """Effects of all k patches of a link on one body that carries them, on the n modes of the body's file."""
 
     Phi_V: Array  # (n, k) modal forces per volt, N/(√kg·V)
-    turn: Array  # (n, k) by how much each mode turns the ends of each patch against each other, rad
-    to_link: Array  # modal forces on the modes of the link's file by those on these, (modes of the link, n)
-    charge: Array  # (n, k) of each patch per unit of each mode, C; Φ_V, of patches that no voltage drives, too
+    turn: Array  # (n, k) rotation of the ends of each patch against each other by each mode, rad/(m·√kg)
+    to_link: Array  # (modes of the link, n) modal forces on the modes of the link's file by those on these modes
+    charge: Array  # (n, k) of each patch per unit of each mode, C/(m·√kg): Φ_V, also where no voltage drives it
     yielding: Array  # (k,) what strains that modes lack add to capacitances, F
 
 
@@ -61,8 +60,8 @@ class LinkPatches:
     arrays: Mapping[str, PatchArray]  # by layout, each on the modes that it reaches
     reach: Reach  # of all patches side by side on the modes that they reach together
     bodies: Mapping[str, OnBody]  # by name, the link and, where it is divided, its pieces
-    slowness: float  # √(ρA/EI) of the link, in s/m²
-    # (n, n) of modal forces the part that the equations keep, where the patches serve that alone
+    slowness: float  # √(ρA/EI) of the link, s/m²
+    # (n, n) from modal forces to the part that the equations keep, where patches serve that alone; without unit
     on_kept: Array | None = None
 
     @property
@@ -76,7 +75,7 @@ class LinkPatches:
         return self.bodies[self.body].Phi_V
 
     def voltages(self, F_p: Array) -> dict[str, Voltages]:
-        """Return the voltages by layout for modal forces F_p (T, n), N/√kg; `unmet`: what all layouts leave."""
+        """Return the voltages by layout for modal forces F_p (T, n), N/√kg; `unmet` is that of all layouts together."""
         found = solve_voltages(self.reach, self.reach.modes.forces(F_p))
         return self._by_layout(found.required, found.within_limit, F_p)
 
@@ -96,7 +95,7 @@ class LinkPatches:
         return np.concatenate([array.edges for array in self.arrays.values()])
 
     def at_voltages(self, V: Array, F_p: Array) -> dict[str, Voltages]:
-        """Return given voltages V (T, k), V, by layout, with what they leave of modal forces F_p (T, n), N/√kg."""
+        """Return given voltages V (T, k), V, by layout, with the part of forces F_p (T, n), N/√kg, that is unmet."""
         return self._by_layout(V, np.clip(V, *self.amplifiers.range), F_p)
 
     def _by_layout(self, required: Array, within: Array, F_p: Array) -> dict[str, Voltages]:
@@ -117,12 +116,12 @@ class LinkPatches:
         return {name: self.reach.modes.forces(of.to_link.T).T for name, of in self.bodies.items()}
 
     def on_link(self, modal: Mapping[str, Array]) -> Array:
-        """Modal forces (T, n), N/√kg, on the modes of the link's file, by those of bodies that carry it on theirs."""
+        """Return modal forces (T, n), N/√kg, on modes of the link's file by forces `modal` on those of its `bodies`."""
         found: Array = np.sum([modal[name] @ of.to_link.T for name, of in self.bodies.items() if name in modal], axis=0)
         return found
 
     def allocation(self, *, limited: bool) -> _core.Allocation:
-        """Return the map from modal forces on the modes of `reach`, N/√kg, to voltages (k,), V, limited or not."""
+        """Return the map from forces (m,) on the modes of `reach`, N/√kg, to voltages (k,), V, limited or not."""
         return allocation(self.reach, limited=limited)
 
     def placed_on(self, start: float, length: float) -> list[tuple[Indices, PlacedLayout]]:
@@ -145,7 +144,7 @@ class LinkPatches:
         return slice(end - len(self.arrays[layout].edges), end)
 
     def unmet(self, F_p: Array, voltages: Array) -> Array:
-        """Return modal forces (T, n), N/√kg, that voltages (T, k), V, of all patches leave of F_p (T, n)."""
+        """Return the part (T, n) of modal forces F_p (T, n), N/√kg, that voltages (T, k), V, of all patches lack."""
         left: Array = F_p - voltages @ self.Phi_V.T
         return left if self.on_kept is None else left @ self.on_kept
 
@@ -156,10 +155,10 @@ def driven_patches(placed: Iterable[PlacedLayout | PatchArray]) -> Array:
 
 
 def placed_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody) -> list[PlacedLayout]:
-    """Return layouts with the positions of their patches on the link, and their strain across it.
+    """Return layouts with the positions of their patches on the link, and with the key `strain`, which has a default.
 
-    Wide links hold layers across; outlined faces strain across as the solid does. Raises `InputError` for patches that
-    do not fit the link.
+    By default wide links and outlined faces prevent strain across a patch. `path` is that of the scene file. Raises
+    `InputError` for patches that do not fit the link.
     """
     placed = []
     for layout in layouts:
@@ -176,9 +175,9 @@ def placed_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody) ->
 
 
 def link_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody, spatial: Body) -> LinkPatches:
-    """Place the layouts of one link: they serve all modes of its file that they reach; see `on_kept_modes`, too.
+    """Place the layouts of one link, so that they serve all modes of its file that they excite; see `on_kept_modes`.
 
-    `spatial`: the equations of the link. Raises `InputError` for patches or weights that do not fit the link.
+    `spatial`: equations of the link. Raises `InputError` for patches or weights that do not fit the link.
     """
     spatial = spatial.whole
     key = _key(path, layouts[0].label if len(layouts) == 1 else layouts[0].body)
@@ -201,7 +200,7 @@ def link_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody, spat
 
 
 def check_reach(path: Path, of_link: LinkPatches) -> None:
-    """Raise `InputError` unless patches reach all modes that they are to serve, or the scene allows less."""
+    """Raise `InputError` unless patches excite all modes that they are to serve, or `allocation` is least-squares."""
     layouts = [array.layout for array in of_link.arrays.values() if array.layout.is_driven]
     if not layouts or any(layout.allocation != "exact" for layout in layouts):
         return

@@ -28,12 +28,12 @@ ENERGY_WEIGHT = 1e-4  # of the strain energy rᵀ K⁻¹ r beside weights of poi
 
 @struct
 class ReachedModes:
-    """Modes of a link that moves in some families of modes only, in coordinates p' that decouple them.
+    """Modes of the families that patches excite, among n modes of a link, in coordinates p' that decouple them.
 
     Attributes:
         rows: (m,) numbers (from 0) of the modes of the modal body in these families.
-        T: (m, m) p of these rows from p', in which m_ff is the identity and K_ff diagonal; (m, fewer) where equations
-            keep fewer, see `link_patches.on_kept_modes`.
+        T: (m, m) p of these modes from p', without unit: m_ff is the identity and K_ff diagonal; (m, fewer) where
+            equations keep fewer, see `link_patches.on_kept_modes`.
         stiffness: (m,) of the p', rad²/s².
         served: number of the p', the first ones, that are no attachment modes.
     """
@@ -44,7 +44,7 @@ class ReachedModes:
     served: int
 
     def forces(self, F_p: Array) -> Array:
-        """Return modal forces (T, m) on p', N/√kg, or other rows linear in modes, from those on the body's (T, n)."""
+        """Return modal forces (T, m), N/√kg, on p' by those (T, n) on the modes of the body."""
         return F_p[:, self.rows] @ self.T
 
     def coordinates(self, p: Array) -> Array:
@@ -59,7 +59,7 @@ class Reach:
     Attributes:
         Phi_V: (n, k) modal forces per volt, N/(√kg·V).
         amplifiers: of the k patches.
-        W_sqrt: (rows, n) |W_sqrt r|² of the modal forces r left unmet is made small.
+        W_sqrt: (rows, n) weights: least squares minimize |W_sqrt r|² of the unmet modal forces r.
     """
 
     modes: ReachedModes
@@ -84,7 +84,7 @@ class Reach:
 
     @property
     def unreached_modes(self) -> Indices:
-        """Indices (k,) of the served modes with forces that no voltages can produce."""
+        """Indices (count,) of the served modes with forces that no voltages can produce."""
         left, sizes, _ = np.linalg.svd(self.Phi_V[: self.served])
         rank = int(np.count_nonzero(sizes > sizes[0] / SINGULAR))
         return np.flatnonzero(np.abs(left[:, rank:]).max(axis=1, initial=0.0) > 0.1)
@@ -102,10 +102,10 @@ def served_first(served: int, n: int, patches: int) -> Array:
 
 
 def weights(key: str, layout: PztLayout, served: int, stiffness: Array, points: Mapping[str, Array]) -> Array:
-    """Return W_sqrt (rows, n): of modes, or of the deflections Φ(x) K⁻¹ r that modal forces r cause at points.
+    """Return W_sqrt (rows, n): of modes, or of the deflections Φ(x) K⁻¹ r that unmet modal forces r cause at points.
 
-    `stiffness` (n,) of the modes, rad²/s², `points` their Φ (components, n), 1/√kg, by name. Raises `InputError` for
-    weights that do not fit.
+    The first `served` of n modes have `stiffness` (n,), rad²/s², and at points by name Φ (components, n), 1/√kg. Raises
+    `InputError`, which begins with `key`, for weights that do not fit.
     """
     order = served_first(served, len(stiffness), layout.patch_count)
     if layout.mode_weights is not None:
@@ -137,7 +137,7 @@ OUT_OF_REACH = 1e-9  # of the largest modal force per volt: less is round-off
 
 
 def reached_modes(per_volt: Array, body: ModalBody, spatial: Body) -> ReachedModes:
-    """Return the modes of the families that patches excite, by their modal forces per volt (k, n), N/(√kg·V)."""
+    """Return the modes of the families that k patches excite, by their modal forces per volt (k, n), N/(√kg·V)."""
     size = np.abs(per_volt).max(axis=0)
     return _modes_of(frozenset(body.family[k] for k in np.flatnonzero(size > OUT_OF_REACH * size.max())), body, spatial)
 
@@ -185,7 +185,7 @@ class Voltages:
 
 
 def voltage_scale(patches: Reach) -> Array:
-    """Ordinary voltages (k,), V: limits of the patches, the largest of these where a patch has none, else 1 V."""
+    """Voltages (k,), V, that scale those of the patches: limits, the largest one where a patch has none, else 1 V."""
     known = np.isfinite(patches.limit)
     return np.where(known, patches.limit, patches.limit[known].max() if known.any() else 1.0)
 
@@ -193,7 +193,7 @@ def voltage_scale(patches: Reach) -> Array:
 def voltage_gain(patches: Reach) -> Array:
     """Voltages (k, n), V√kg/N, per modal force without limits: Φ_V⁻¹, or those of least weighted residual.
 
-    Of many that do, the smallest relative to `voltage_scale`.
+    If many have it, they are the smallest relative to `voltage_scale`.
     """
     (n, k), served = patches.Phi_V.shape, patches.served
     if k == served and patches.serves_all:
@@ -224,8 +224,8 @@ class PatchArray(Reach):
     Attributes:
         layout: the keys of the scene.
         edges: (k, 2) where each patch begins and ends along the link, m.
-        effects: on the modes of the `link`.
-        turn: (n, k) φ'(x2) − φ'(x1) of the n `modes`, rad per unit of modal coordinate; of twist φ_x.
+        effects: effects on the modes of the `link`.
+        turn: (n, k) rotation of the ends of each patch against each other by the n `modes`, rad/(m·√kg).
         link: the modal body of the link that they are on.
     """
 
@@ -256,12 +256,12 @@ class PatchArray(Reach):
 
     @property
     def authority(self) -> Array:
-        """Share (k,) of c V that bends the link against the patches' own stiffness."""
+        """Curvature (or twist) under a voltage (k,), relative to that without the stiffness of the patches."""
         return self._stiffness[1]
 
     @property
     def stiffness_in_words(self) -> str:
-        """ψ and the authority, and whether the link feels the stiffness of its patches."""
+        """Text with ψ and the authority, and on whether the equations have the stiffness of the patches."""
         if not np.isfinite(self.authority).all():
             return f"{self.layout.label}: stiffness ratio ψ not known: the modal body has no rigidities"
         spans = [dict.fromkeys(f"{value:.3g}" for value in (of.min(), of.max())) for of in self._stiffness]

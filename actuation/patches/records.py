@@ -55,7 +55,7 @@ class Amplifier(Record):
         return self
 
     def lists(self) -> Iterator[tuple[str, int]]:
-        """Keys with a list, and its length."""
+        """Yield each key with a list, and the length of the list."""
         for key in type(self).model_fields:
             if np.ndim(value := getattr(self, key)) == (2 if key == "range" else 1):
                 yield key, len(value)
@@ -88,12 +88,12 @@ class Lamina(NamedTuple):
     """Stress (σ_x, τ_xs) = C (ε_x, γ_xs) − C Λ V, Pa, of one layer; x along the link, s across it in the layer."""
 
     C: Array  # (2, 2) Pa
-    per_volt: Array  # (2,) C Λ, Pa/V: the stress that a volt takes off a layer which is held
-    energy: float  # (C Λ) Λ, Pa/V²: what a held layer lacks of its permittivity times the field of a volt, squared
+    per_volt: Array  # (2,) C Λ, Pa/V, with the free strains Λ of a volt
+    energy: float  # (C Λ) Λ, Pa/V²: what a clamped layer lacks of its permittivity times the field of a volt, squared
 
     @property
     def shears(self) -> bool:
-        """Whether shear loads it, or is loaded by a voltage."""
+        """Whether the layer resists shear, or a voltage shears it."""
         return bool(self.C[:, 1].any() or self.per_volt[1])
 
 
@@ -141,8 +141,8 @@ class PztLayout(Record):
     """Equal piezoelectric patches along one link; several layouts on a body have names.
 
     Layers on both faces have opposite voltages. A positive voltage bends towards +y or +z (with d31 > 0), or twists by
-    a positive angle. With their stiffness patches bend the link like a composite section; in the paper they add
-    nothing. No voltage drives patches with open or shorted `electrodes`, or a `shunt`.
+    a positive angle. With their stiffness patches bend the link like a composite section; in Shabana 2022 they add
+    none. No voltage drives patches with open or shorted `electrodes`, or a `shunt`.
 
     Plain ceramic has one modulus and d31. Macro fiber composites have `fibre_angle`, d33 and `modulus` along the
     fibers, d31 and `modulus_across` across them, `shear_modulus` and `poissons_ratio`. Fibers at an angle wind around
@@ -280,7 +280,7 @@ class PztLayout(Record):
     def read_capacitance(self, yielding: Array) -> Array:
         """Return the capacitances (k,) of patches as sensors, F: free ones, those with open electrodes clamped.
 
-        The latter yield to strains that modes lack by `yielding` (k,), F, as in `Effects`.
+        The latter get `Effects.yielding` (k,), F, in addition, as strains that modes lack relax them.
         """
         is_open = self.electrodes == "open"
         return self.capacitance(clamped=is_open) + is_open * yielding
@@ -430,6 +430,6 @@ class PztLayout(Record):
 
 
 def by_body(layouts: Sequence[PztLayout]) -> Iterator[tuple[str, list[PztLayout]]]:
-    """Bodies with patches, in the order of their first layouts."""
+    """Yield each body with patches and its layouts, in the order of first layouts."""
     for body in dict.fromkeys(layout.body for layout in layouts):
         yield body, [layout for layout in layouts if layout.body == body]

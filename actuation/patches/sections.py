@@ -4,9 +4,9 @@ Layers at the distance η from the axis strain as the section does,
 
     ε = u' − η κ − ζ κ_t,    γ = β |η| φ_x'
 
-with the curvatures κ towards their normal and κ_t across it, ζ across the width and β of `LinkSections.shear_lever`,
-and have the stress C (ε, γ) − C Λ V (`Lamina`). By virtual work their loads on the section are ∫ Bᵀ (C Λ V − C B e) dA
-with the rows B of these strains. Voltages on both faces are opposite to bend, and alike to twist.
+with the curvatures κ towards their normal and κ_t across it, ζ across the width and β of `LinkSections.shear_lever`.
+Their stress is C (ε, γ) − C Λ V (`Lamina`), their loads on the section, by virtual work, ∫ Bᵀ (C Λ V − C B e) dA with
+the rows B of these strains. Voltages on both faces are opposite to bend, and alike to twist.
 """
 
 from functools import cached_property, lru_cache
@@ -32,7 +32,7 @@ class LinkSections:
     """Section properties of a link from each of its k stations on; NaN if unknown.
 
     Attributes:
-        x: (k,) m.
+        x: (k,) m from the root.
         height, width: (k,) along y and z, m.
         is_round: (k,) whether a circle bounds the section.
         rigidity: (k, 4) of the strains e: EI in plane, EA, GJ, EI out of plane, N·m² and N.
@@ -61,8 +61,8 @@ class LinkSections:
     def shear_lever(self, station: int, normal: Literal["y", "z"], patch_width: float) -> float:
         """Return β: mean shear of the surface under a patch by unit twist, over its distance from the axis.
 
-        1 of round sections (γ = r φ'), 2 of thin strips (γ = 2 d φ', plates), St Venant's of other rectangles.
-        `patch_width` in m.
+        It is 1 of round sections (γ = r φ'), 2 of thin strips (γ = 2 d φ', plates), St Venant's of other rectangles.
+        `patch_width` is in m.
         """
         if self.is_round[station]:
             return 1.0
@@ -100,7 +100,10 @@ def link_sections(body: ModalBody) -> LinkSections:
 
 
 def check_sections(key: str, body: ModalBody, normal: Literal["y", "z"], *, twists: bool) -> None:
-    """Raise `InputError` where the modal body lacks the section data for patches on faces with that normal."""
+    """Raise `InputError` where the modal body lacks the section data for patches on faces with that normal.
+
+    `twists`: the patches have fibers at an angle, which need the outline of the sections. `key` begins the message.
+    """
     if np.isnan(link_sections(body).extent(normal)).any():
         raise InputError(
             f"{key}: expected a modal body file with the width of the link (stations/width)",
@@ -131,7 +134,7 @@ def check_width(key: str, body: ModalBody, layout: PztLayout, edges: Array) -> N
 
 
 def potentials(body: ModalBody, x: Array) -> Array:
-    """Return φ_z, u, φ_x, −φ_y (m, 4, n) of n modes at x (m,), m: rad and m per unit of each.
+    """Return φ_z, u, φ_x, −φ_y (m, 4, n) of n modes at x (m,), m: rad and m per m·√kg.
 
     Their differences are the integrals of the strains e along x.
     """
@@ -160,7 +163,7 @@ def across_row(layout: PztLayout) -> int:
 
 
 def felt_rows(layout: PztLayout) -> Indices:
-    """Return the indices of the strains e that interact with the patches; see `composite`."""
+    """Return indices of the strains e (0 to 3) that interact with the patches: all on named faces, else their own."""
     if layout.face is None:
         return np.array([own_row(layout)])
     return np.flatnonzero([True, True, layout.lamina.shears, True])
@@ -169,7 +172,7 @@ def felt_rows(layout: PztLayout) -> Indices:
 def layer_section(layout: PztLayout, extent: float) -> tuple[float, float, float]:
     """Return (A, S, I) = w ∫ (1, η, η²) dη over all layers, m², m³, m⁴; η from the link's axis.
 
-    For a link of that `extent` t_b (m) along their normal; layers without a named face lie on one.
+    `extent` is t_b (m) of the link along their normal; layers without a named face lie on one.
     """
     w, t = layout.width, layout.layers * layout.thickness
     inner, outer = extent / 2, extent / 2 + t
@@ -181,9 +184,9 @@ def layer_section(layout: PztLayout, extent: float) -> tuple[float, float, float
 def layer_loads(layout: PztLayout, extent: float, lever: float) -> tuple[Array, Array]:
     """Return C (4, 4) and f (4,) of the loads P = f V − C e of all layers on a section, N·m and N, by its strains e.
 
-    For a link `extent` (m) along their normal; `lever` is β. Along the strain that they actuate, f of plain ceramic on
-    one face is E_p d31 w_p N (t_b + N t_p)/2 N·m/V: the layers' arms, t_b/2 + (i − ½) t_p, are summed (one: Eq. 14 of
-    Shabana 2022). Both faces double it; twist has the shear force per width of a volt, times β, in place of E_p d31.
+    The link has `extent` t_b (m) along their normal; `lever` is β. Along the strain that they actuate, f of plain
+    ceramic on one face is E_p d31 w_p N (t_b + N t_p)/2 N·m/V: the layers' arms, t_b/2 + (i − ½) t_p, are summed (one:
+    Eq. 14 of Shabana 2022). Both faces double it; twist has the shear stress of a volt, times β, in place of E_p d31.
     """
     A, S, I = layer_section(layout, extent)  # noqa: E741
     sign, middle, w = np.sign(S), layout.offset, layout.width
