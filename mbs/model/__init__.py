@@ -1,1 +1,1 @@
-"""The model of a scene: bodies, measures between markers, transmissions, the system that the core evaluates."""
+"""The model of a scene: bodies, joints, constraint equations, gears, and the system that the core evaluates."""

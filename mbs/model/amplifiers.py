@@ -1,4 +1,4 @@
-"""Amplifiers of patches: their limits, the current that a motion takes, and the voltages that arrive of those wanted.
+"""Amplifiers of patches: limits, the current that a motion takes, and the voltages that arrive for wanted ones.
 
 A patch is a capacitor that its link stretches. By reciprocity its charge is q = C V + Φ_Vᵀ p: Φ_V are the modal forces
 of a volt, C is the capacitance of the patch on a link that stands still (Lee and Moon, J. Appl. Mech. 57, 1990).
@@ -25,10 +25,10 @@ CHUNK = 1024  # voltages, all on one way up or down, whose play operators are fo
 
 @struct
 class Hysteresis:
-    """Play operators of k patches; thresholds, V, ascend from 0, spare ones have no weight."""
+    """Hysteresis of k patches, which act as under the voltage Σ w z of play operators z."""
 
-    weights: Array  # (MOST_PLAYS, k)
-    thresholds: Array  # (MOST_PLAYS, k) V
+    weights: Array  # (MOST_PLAYS, k) w, without unit; 0 of spare operators
+    thresholds: Array  # (MOST_PLAYS, k) V, ascending from 0: z follows the voltage at this distance
 
     @property
     def acts(self) -> bool:
@@ -37,22 +37,25 @@ class Hysteresis:
 
     @property
     def inverse(self) -> Hysteresis:
-        """Hysteresis of the voltages, V, that patches take to act as wanted, from rest on."""
+        """Hysteresis from voltages, V, as which patches should act to those that they need, from rest on."""
         W = np.cumsum(self.weights, axis=0)
         weights = np.diff(1.0 / W, axis=0, prepend=0.0)
         return Hysteresis(weights, W * self.thresholds - np.cumsum(self.weights * self.thresholds, axis=0))
 
     def plays(self, z: Array, V: Array) -> Array:
-        """Return z (…, MOST_PLAYS, k) at voltages V (…, k), all on one way up or down, after z (MOST_PLAYS, k), V."""
+        """Return states (…, MOST_PLAYS, k), V, of play operators at voltages V (…, k) after states z (MOST_PLAYS, k).
+
+        Voltages of each patch only rise, or only fall.
+        """
         V = V[..., None, :]
         return np.clip(z, V - self.thresholds, V + self.thresholds)
 
     def acting(self, plays: Array) -> Array:
-        """Return the voltages (…, k) that patches act under, Σ w z, of `plays` (…, MOST_PLAYS, k), V."""
+        """Return the voltages (…, k), V, as under which patches act: Σ w z, with z = `plays` (…, MOST_PLAYS, k), V."""
         return (self.weights * plays).sum(axis=-2)
 
     def output(self, V: Array) -> Array:
-        """Return the voltages (T, k) that patches act under of V (T, k), V, straight between these, from rest."""
+        """Return the voltages (T, k), V, as under which patches act at V (T, k), V, linear between, from rest."""
         acting, z = np.empty_like(V), np.zeros_like(self.weights)
         turns = np.flatnonzero(np.diff(np.sign(np.diff(V, axis=0)), axis=0).any(axis=1)) + 2
         begins = np.union1d(turns, np.arange(0, len(V), CHUNK))
@@ -63,13 +66,13 @@ class Hysteresis:
 
 
 class Played:
-    """State of play operators that are asked step by step, from rest on; SI units."""
+    """State of play operators step by step, from rest on; SI units."""
 
     def __init__(self, of: Hysteresis) -> None:
         self._of, self._z = of, np.zeros_like(of.weights)
 
     def at(self, V: Array, last: Array | None = None) -> Array:
-        """Return the voltages (k,) that patches act under at V (k,), V, on their way to the `last` (k,)."""
+        """Return the voltages (k,), V, as under which patches act at V (k,), V, on the way to the `last` (k,)."""
         output = self._of.acting(self._of.plays(self._z, V))
         self._z = self._of.plays(self._z, V if last is None else last)
         return output
@@ -83,7 +86,7 @@ class Amplifiers:
         range: (2, k) smallest and largest voltage, V.
         slew: (k,) largest rate of the voltage, V/s.
         current: (k,) largest current, A.
-        capacitance: (k,) F, see the module.
+        capacitance: (k,) F, of patches on a link that stands still.
         bandwidth: (k,) of first order, Hz.
         delay: (k,) s.
         plays: (2, MOST_PLAYS, k) weights and thresholds of the patches' hysteresis.
@@ -101,7 +104,7 @@ class Amplifiers:
 
     @property
     def lag(self) -> Array:
-        """Time constants (k,), s."""
+        """Time constants (k,), s, of the amplifiers."""
         return 1.0 / (2 * np.pi * self.bandwidth)
 
     @property
@@ -111,7 +114,7 @@ class Amplifiers:
 
     @property
     def acts(self) -> bool:
-        """Whether voltages may arrive late."""
+        """Whether voltages may arrive late or with hysteresis."""
         return self.has_rates or self.hysteresis.acts or bool(self.lag.any() or self.delay.any())
 
     @property
@@ -134,9 +137,9 @@ class Amplifiers:
         return replace(self, range=np.stack([-none, none]), slew=none, current=none)
 
     def advance(self, h: float, now: Array, wanted: tuple[Array, Array], strain: Array) -> tuple[Array, Array]:
-        """Voltages (k,) after a step `h` (s) from those `now`, and their means, V.
+        """Return voltages (k,), V, after a step `h` (s) from those `now` (k,), and their means over it.
 
-        `wanted` is linear in the step, from its first to its second value; `strain` (k,) the current Φ_Vᵀ ṗ in it, A.
+        `wanted` (k,), V, is linear in the step, from its first to its second value; `strain` (k,): current Φ_Vᵀ ṗ, A.
         """
         with np.errstate(divide="ignore"):
             x = h / self.lag
@@ -152,9 +155,9 @@ class Amplifiers:
         return kept, np.where(kept == after, mean, (now + kept) / 2)
 
     def output(self, times: Array, wanted: Array, strain: Array) -> Array:
-        """Voltages (T, k), V, that patches act under at `times` (T,), s, of `wanted` (T, k), linear between.
+        """Return voltages (T, k), V, as under which patches act at `times` (T,), s, of `wanted` (T, k), linear between.
 
-        `strain` (T, k), A: see `advance`.
+        `strain` (T, k), A: current by the strain of the patches, Φ_Vᵀ ṗ.
         """
         wanted = self.compensator.output(wanted)
         late = [np.interp(times - d, times, V) for d, V in zip(self.delay, wanted.T, strict=True)]
@@ -174,7 +177,7 @@ class Driven(Protocol):
 
 
 def joined(links: Iterable[Driven]) -> Amplifiers:
-    """Return the amplifiers of all patches of links, one link after the other."""
+    """Return the amplifiers of all patches of `links`, in this order."""
     none = {field.name: np.zeros(0) for field in fields(Amplifiers)}
     none |= {"range": np.zeros((2, 0)), "plays": np.zeros((2, MOST_PLAYS, 0))}
     parts = [none, *(vars(of_link.amplifiers) for of_link in links)]

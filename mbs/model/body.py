@@ -1,4 +1,4 @@
-"""What a scene needs of a body: invariants of the (R, e, p) equations and sections where things attach. SI units."""
+"""Bodies in the equations of motion: invariants of the (R, e, p) equations, and sections. SI units."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ IN_PLANE = ("t_x", "t_y", "r_z", "omega_zz")
 
 @struct
 class Stiffening:
-    """Integrals of G (n, n), by which points move by −½ pᵀ G_l p along l; K is positive where it stiffens under a load.
+    """Integrals of G (n, n): bending moves points by −½ pᵀ G_l p along axis l; positive K stiffens under a load.
 
     Attributes:
-        K_s: (3, n, n) ∫ρ G_l dV.
-        K_x: (3, 3, n, n) ∫ρ x_k G_l dV at [k, l].
-        K_points: (6, n, n) of forces along and moments about x, y, z at each interface.
-        S_turned: (3, 3, n, n) of the extent of payloads, which turn with their points: what S̄_kl has of it where K_x
-            has it to second order, too.
+        K_s: (3, n, n) ∫ρ G_l dV, 1/m.
+        K_x: (3, 3, n, n) ∫ρ x_k G_l dV at [k, l], without unit.
+        K_points: (6, n, n) G of each interface along x, y, z, 1/(kg·m), and of its rotation about them, 1/(kg·m²).
+        S_turned: (3, 3, n, n) part of S̄_kl by the extent of payloads, which turn with their points, without unit. Only
+            equations with K_x have it, as `Body.S_bar_kl` lacks it.
     """
 
     K_s: Array
@@ -43,20 +43,20 @@ class Stiffening:
     S_turned: Array
 
     def at(self, point: str) -> Array:
-        """Return geometric stiffness (6, n, n), 1/s² by N and N·m along x, y, z at a point; zero if unknown."""
+        """Return stiffness (6, n, n), 1/s² per N and N·m, of loads along and about x, y, z at a point; 0 if unknown."""
         n = self.K_s.shape[-1]
         return self.K_points.get(point, np.zeros((6, n, n)))
 
     def transformed(self, T: Array) -> Stiffening:
-        """Return the stiffness in coordinates p' with p = T p', T (n, m)."""
+        """Return the stiffness in coordinates p' (m,) with p = T p', T (n, m) without unit."""
         points = {name: T.T @ K @ T for name, K in self.K_points.items()}
         return Stiffening(T.T @ self.K_s @ T, T.T @ self.K_x @ T, MappingProxyType(points), T.T @ self.S_turned @ T)
 
     def with_payload(self, point: str, position: Array, phi: Array, mass: float, arm: Array, E: Array) -> Stiffening:
         """Add a rigid mass (kg) at `arm` (3,), m, from a point; E (3, 3) = ∫ρ ξ ξᵀ dV, kg·m².
 
-        `position` (3,), m, and `phi` = Φ_r (3, n) of the point. What is d from it moves by (exp φ~ − 1) d too, so that
-        pᵀG p = pᵀK p + pᵀK_r p × d − φ × (φ × d), with φ = Φ_r p, K along and K_r about the axes.
+        `position` (3,), m, and `phi` = Φ_r (3, n), 1/(m·√kg), are of the point. A place d from it moves by
+        (exp φ~ − 1) d, too: pᵀG p = pᵀK p + pᵀK_r p × d − φ × (φ × d), φ = Φ_r p, with K along and K_r about the axes.
         """
         by_arm = self._by_arm(point, phi)
         G_center = self.at(point)[:3] + np.einsum("lbmn,b->lmn", by_arm, arm)
@@ -70,7 +70,7 @@ class Stiffening:
         )
 
     def with_tool(self, name: str, point: str, phi: Array, arm: Array) -> Stiffening:
-        """Add a point `name` at `arm` (3,), m, rigidly attached to one of its points."""
+        """Add a point `name` at `arm` (3,), m, from a point of the body with `phi` = Φ_r (3, n), 1/(m·√kg)."""
         K = self.at(point).copy()
         K[:3] += np.einsum("lbmn,b->lmn", self._by_arm(point, phi), arm)
         return replace(self, K_points=MappingProxyType({**self.K_points, name: K}))
@@ -116,9 +116,9 @@ def stiffening_of(body: ModalBody, *, is_planar: bool) -> Stiffening | None:
 
 @struct
 class BodyPoint:
-    """A section of a body: position (3,) m, Φ as `translation` (3, n), Φ_r as `rotation` (3, n), in body axes.
+    """A section of a body: position (3,), m, Φ as `translation` (3, n), 1/√kg, Φ_r as `rotation` (3, n), 1/(m·√kg).
 
-    `triad` (3, 3): its axes, columns, in those of the undeformed body; of a tool they may be others (see `with_tool`).
+    All are in body axes. `triad` (3, 3): its axes, columns; those of a tool may differ from those of the body.
     """
 
     position: Array
@@ -128,7 +128,7 @@ class BodyPoint:
 
     @property
     def is_turned(self) -> bool:
-        """Whether its axes are others than those of the body."""
+        """Whether axes of the section differ from those of the body."""
         return not np.array_equal(self.triad, np.eye(3))
 
 
@@ -136,7 +136,7 @@ class BodyPoint:
 class Body(Invariants):
     """Constants of one body in the equations of motion, SI units (Shabana, Dynamics of Multibody Systems, ch. 5).
 
-    Arrays are over all n modes of the link; `m_ff` is the identity. `S_bar_kl` is without S_spin, which files book
+    Arrays are over all n modes of the equations; `m_ff` is the identity. `S_bar_kl` is without S_spin, which files have
     at [2, 2].
     """
 
@@ -144,11 +144,11 @@ class Body(Invariants):
     stiffness: Array  # K_ff (n,) in rad²/s²
     damping: Array  # D_ff (n, n) in 1/s
     points: Mapping[str, BodyPoint]  # its sections by name
-    modal_transform: Array  # (n_file, n) p of the modal file is this times p
+    modal_transform: Array  # (n_file, n) from p to modal coordinates of the file, without unit
     length: float | None = None  # of a link in m; None of a rigid body
     reduction: Reduction | None = None  # where it has fewer modes than its file
     attachment_modes: int = 0  # how many of the n, after all others, are static shapes of loads at interfaces
-    stiffening: Stiffening | None = None  # what bending does to second order; left out of the equations where None
+    stiffening: Stiffening | None = None  # geometric stiffness; left out of the equations where None
 
     @property
     def n_modes(self) -> int:
@@ -167,9 +167,9 @@ class Body(Invariants):
 
     @cached_property
     def on_file(self) -> Array:
-        """Matrix (n, n_file) that maps forces on p to equivalent forces on the modes of the file.
+        """Matrix (n, n_file), without unit: F_p times it are the equivalent forces on the modes of the file.
 
-        Of a body with fewer modes they are those of loads at its loaded points, which act on all modes.
+        With fewer modes than the file, they are those of loads at the loaded points, which act on all modes.
         """
         if self.reduction is not None:
             return self.reduction.lift.T @ self.whole.on_file
@@ -177,7 +177,7 @@ class Body(Invariants):
 
     @property
     def inertia(self) -> Array:
-        """J0 (3, 3) about the origin of the frame, kg·m²: tr(J2) I − J2, and J_s about the axis of a line of mass."""
+        """Inertia tensor J0 (3, 3) about the origin of the frame, kg·m²: tr(J2) 1 − J2, and J_s of a line of mass."""
         J: Array = np.trace(self.second_moment) * np.eye(3) - self.second_moment
         J[0, 0] += self.J_spin
         return J
@@ -189,37 +189,37 @@ class Body(Invariants):
 
     @property
     def inertia_slope(self) -> Array:
-        """J1 (3, 3, n), √kg·m: J1_ij = 2δ_ij tr Ī − Ī_ij − Ī_ji."""
+        """J1 (3, 3, n), √kg·m, change of the inertia tensor by modes: J1_ij = 2δ_ij tr Ī − Ī_ij − Ī_ji."""
         return 2 * np.einsum("ij,kkn->ijn", np.eye(3), self.I_bar) - self.I_bar - self.I_bar.transpose(1, 0, 2)
 
     @property
     def spin(self) -> Array:
-        """h0 (3, n), √kg·m: h0_a = ε_abc Ī_bc, and h_s about the axis of a line of mass."""
+        """h0 (3, n), √kg·m, angular momentum by modal rates: h0_a = ε_abc Ī_bc, and h_s of a line of mass."""
         h: Array = np.einsum("abc,bcn->an", LEVI_CIVITA, self.I_bar)
         h[0] += self.h_spin
         return h
 
     @property
     def spin_slope(self) -> Array:
-        """H (3, n, n), skew: H_a = ε_abc S̄_bc, so that h_a(p) = h0_a + pᵀH_a."""
+        """H (3, n, n), skew, without unit: H_a = ε_abc S̄_bc, so that h_a(p) = h0_a + pᵀH_a."""
         S: Array = self.S_bar_kl
         return np.array([S[1, 2] - S[2, 1], S[2, 0] - S[0, 2], S[0, 1] - S[1, 0]])
 
 
 @struct
 class Reduction:
-    """Origin of a body with fewer modes; see `truncation.with_fewer_modes`."""
+    """Relation of a body with m coordinates to all n modes, without units; see `truncation.with_fewer_modes`."""
 
     whole: Body  # the body with all n modes of its file
-    lowest: int  # how many of these it kept; the other coordinates stand for the rest
-    T: Array  # (n, m) coordinates of `whole` from the m that it has, TᵀT = 1
+    lowest: int  # number of modes that are kept; other coordinates are static shapes
+    T: Array  # (n, m) coordinates of `whole` from the m ones, TᵀT = 1
     # (n, m) modal forces on all modes from those on the m coordinates, Tᵀ lift = 1: exact for forces that come from
     # loads at the loaded points
     lift: Array
 
 
 def transformed(body: Body, T: Array, stiffness: Array) -> Body:
-    """Return the body by p' with p = T p', T (n, m), in which m_ff is the identity, K_ff diag(stiffness), rad²/s²."""
+    """Return the body in p' with p = T p', T (n, m) without unit: m_ff = 1, K_ff = diag(`stiffness` (m,)), rad²/s²."""
     return replace(
         body,
         stiffness=stiffness,
@@ -241,7 +241,7 @@ def transformed(body: Body, T: Array, stiffness: Array) -> Body:
 
 
 def scaled(body: Body, *, mass: float = 1.0, stiffness: float = 1.0) -> Body:
-    """The body with `mass` and `stiffness` times its own everywhere, at the same damping ratios."""
+    """Return the body with its mass and stiffness times factors `mass` and `stiffness`, at the same damping ratios."""
     of_mass = ("mass", "first_moment", "second_moment", "S_bar", "I_bar", "S_bar_kl", "J_spin", "h_spin", "S_spin")
     damping = body.damping * (mass * stiffness) ** 0.5
     heavier = replace(body, damping=damping, **{key: mass * getattr(body, key) for key in of_mass})
@@ -255,9 +255,9 @@ def scaled(body: Body, *, mass: float = 1.0, stiffness: float = 1.0) -> Body:
 
 
 def from_modal_body(name: str, body: ModalBody, stiffened: bool = False, *, is_planar: bool = False) -> Body:
-    """All modes of a modal body; `stiffened`: with geometric stiffening; `is_planar`: for motion in z = 0 alone.
+    """Make a body with all modes of a modal body; `stiffened`: with geometric stiffness; `is_planar`: moving in z = 0.
 
-    Raises `InputError` where the file of a beam lacks the inertia about its own axis, or how a body to be stiffened is.
+    Raises `InputError` where the file lacks the inertia of a beam about its own axis, or the geometric stiffness.
     """
     stiffening = stiffening_of(body, is_planar=is_planar) if stiffened else None
     if stiffened and stiffening is None:
@@ -296,7 +296,7 @@ def from_modal_body(name: str, body: ModalBody, stiffened: bool = False, *, is_p
 
 
 def rigid_body(name: str, mass: float, center: Array, inertia: Array, points: Mapping[str, Array]) -> Body:
-    """A body without modes: `mass`, kg, at `center` (3,), m, with `inertia` (3, 3), kg·m², about it, `points`, m."""
+    """Make a body without modes: `mass`, kg, at `center` (3,), m, `inertia` (3, 3), kg·m², about it, points (3,), m."""
     places = {label: np.asarray(position, dtype=float) for label, position in points.items()}
     if "mid" not in places and {"root", "tip"} <= places.keys():
         places["mid"] = (places["root"] + places["tip"]) / 2
@@ -333,14 +333,14 @@ def _spin_inertia(name: str, body: ModalBody, *, is_planar: bool) -> tuple[float
 
 
 class BentSection(NamedTuple):
-    """Section of a bent body: u = x + Φp − … (…, 3), m, and φ = Φ_r p − … (…, 3)."""
+    """Section of a bent body to second order: position u = x + Φp − … (…, 3), m, rotation φ = Φ_r p − … (…, 3), rad."""
 
     u: Array
     phi: Array
 
 
 def bent_section(body: Body, point: str, p: Array) -> BentSection:
-    """Return a point of a body in its axes, bent by p (…, n), √kg·m."""
+    """Return the section `point` of a body bent by p (…, n), √kg·m, in body axes."""
     at = body.points[point]
     u, phi = at.position + p @ at.translation.T, p @ at.rotation.T
     if body.stiffening is None:
@@ -355,9 +355,9 @@ def orientation(tool: Tool) -> Array:
 
 
 def with_tool(body: Body, tool: Tool) -> Body:
-    """The body with one more point, d from a section that bending turns by φ = Φ_r p: it moves by Φp + φ × d.
+    """Return the body with a tool as one more point, at d from a section: bending moves it by Φp + φ × d, φ = Φ_r p.
 
-    With geometric stiffening also by ½ φ × (φ × d): see `Stiffening.with_tool`.
+    Geometric stiffness adds ½ φ × (φ × d): see `Stiffening.with_tool`.
     """
     point = split_point(tool.point)[1]
     at, d = body.points[point], np.array(tool.at)

@@ -1,9 +1,7 @@
-"""From a scene and its bodies to a model: the tree, and rows of constraints that close loops or follow paths.
+"""From a scene and its bodies to a model: the tree, and constraint equations that close loops or follow paths.
 
-Coordinates of revolute joints between frames of bodies, not sections, for `motors = "frame"`.
-
-They are coordinates of a joint where modes turn its sections about its axis alone. Where they tilt the axis there are
-none: a moment between frames has virtual work there, but no angle that goes with it.
+With `motors = "frame"` angles of revolute joints are between frames of bodies, not sections, where modes turn the
+sections about the axis alone. Where they tilt the axis, the moment between frames has no angle with its virtual work.
 """
 
 import copy
@@ -30,7 +28,7 @@ from .tree import KinematicTree, cut_coordinates, cut_row, loop_rows, with_auxil
 
 
 def build_model(scene: MechanismScene, bodies: Sequence[Body]) -> Model:
-    """Lay out tree and constraint rows of a scene. Raises `InputError` for missing points or inconsistent rows."""
+    """Make tree and constraint equations of a scene. Raises `InputError` for missing points or impossible equations."""
     _check_points(scene, {body.name: body for body in bodies})
     carried = list(welded_payloads(scene))
     joints = (*scene.joint, *(weld for _, weld in carried))
@@ -78,7 +76,7 @@ def _path_rows(scene: MechanismScene, tree: KinematicTree, path: Trajectory) -> 
 
 
 def row_of_joint(tree: KinematicTree, joint: JointRecord, owner: str, target: TimeFunction) -> ConstraintRow:
-    """Return the row by which a joint with one coordinate, cut or not, follows `target`."""
+    """Return the equation, of `owner`, by which a joint with one coordinate, in a tree or cut, follows `target`."""
     if joint.name not in tree.carried:
         return replace(cut_row(tree, joint), owner=owner, is_trajectory=True, target=target)
     node = tree.nodes[tree.carried[joint.name]]
@@ -111,7 +109,7 @@ ALONG = 1e-12  # of the largest rotation of modes: what is left of them across a
 
 
 def with_coordinates_of_frames(tree: KinematicTree) -> KinematicTree:
-    """The tree whose revolute joints have angles between frames, where modes turn sections about the axis alone."""
+    """Return the tree with angles between frames in revolute joints where modes turn sections about the axis alone."""
     changed, joints = copy.copy(tree), (*(node.joint for node in tree.nodes), *tree.loops)
     changed.on_frames = frozenset(
         joint.name

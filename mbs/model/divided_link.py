@@ -1,9 +1,8 @@
-"""A link in pieces as the one link: what modal coordinates of the link are in those of its pieces, and back. SI units.
+"""Subdivided links: modal coordinates of the link by those of its pieces, and back. SI units.
 
-A link that bends as its modes say bends every piece, seen from the chord of that piece. Of the shapes of a piece those
-coordinates are taken that leave the least strain energy of the difference; since a piece has the static shapes of
-moments at its ends, the rotations of its ends are then those of the link (what is orthogonal in energy to a load's
-static shape does no work with that load), and so are turns of sections from cut to cut along the whole link.
+A link that bends in its modes bends every piece, relative to the chord of the piece. The coordinates of a piece
+minimize the strain energy of the difference. Since a piece has the static shapes of moments at its ends, its ends then
+rotate as those of the link: what is orthogonal in energy to a load's static shape does no work with that load.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,32 +20,30 @@ INTERVALS = 32  # of a piece, over which strains are taken as constant
 
 @struct
 class DividedLink:
-    """The n modal coordinates of a link and the N of its pieces, side by side from the root to the tip."""
+    """Relation, without unit, of n modal coordinates of a link to N of its pieces, side by side from root to tip."""
 
     bodies: tuple[str, ...]  # names of the pieces
-    # (N, n) p of the pieces where the link bends in its modes. Its transpose makes modal forces on the link of those on
-    # the pieces: virtual work
+    # (N, n) p of the pieces by p of the link. Its transpose makes modal forces on the link from those on the pieces
     spread: Array
-    # (n, N) p of the link that are nearest to those of the pieces, in strain energy; the smallest where the link has
-    # more modes than its pieces
+    # (n, N) p of the link nearest in strain energy to those of the pieces; the smallest where the link has more modes
     gathered: Array
 
 
 @struct
 class LinkInPieces:
-    """A link in pieces, to read the motion of the pieces as that of the link."""
+    """A subdivided link, to read the motion of its pieces as that of the link."""
 
-    modal: ModalBody  # its modal body
+    modal: ModalBody  # modal body of the link
     names: tuple[str, ...]  # of the pieces, from the root to the tip
-    starts: Sequence[float]  # where each begins, m from the root
-    pieces: tuple[ModalBody, ...]  # their modal bodies
-    places: Mapping[str, str]  # of its points by label, as "PIECE.POINT"
-    points: Mapping[str, BodyPoint]  # the same in the whole link
-    to_own: Array  # (n_file, n) modal coordinates of the whole link in the equations, by those of its file
+    starts: Sequence[float]  # where each piece begins, m from the root
+    pieces: tuple[ModalBody, ...]  # modal bodies of the pieces
+    places: Mapping[str, str]  # "PIECE.POINT" of each point of the link by label
+    points: Mapping[str, BodyPoint]  # these points in the whole link
+    to_own: Array  # (n_file, n), without unit: p (T, n_file) of the file times it are p (T, n) of the link's equations
 
 
 class PieceOfLink(NamedTuple):
-    """A piece of a link in space: where it begins, m from the root of the link, its modal body, and its equations."""
+    """A piece of a link: `start`, m from the root of the link, its modal body, and its equations (`spatial`)."""
 
     start: float
     modal: ModalBody
@@ -54,7 +51,7 @@ class PieceOfLink(NamedTuple):
 
 
 def divided_link_of(link: ModalBody, spatial: Body, pieces: Sequence[PieceOfLink]) -> DividedLink:
-    """Return the relation between a link and its pieces, in the coordinates of the pieces' equations."""
+    """Return the relation between a link and its pieces, in coordinates of their equations (`spatial` of the link)."""
     of_file = [_shape_in_piece(link, piece.start, piece.modal) for piece in pieces]
     own = [np.linalg.pinv(piece.spatial.modal_transform) @ p for piece, p in zip(pieces, of_file, strict=True)]
     spread = np.vstack(own) @ spatial.modal_transform
@@ -64,10 +61,10 @@ def divided_link_of(link: ModalBody, spatial: Body, pieces: Sequence[PieceOfLink
 
 
 def spread_of(link: ModalBody, pieces: Sequence[tuple[float, ModalBody]]) -> Array:
-    """Return the matrix (N, n), without unit, from modes of a link in 3D to modes of its pieces, both of the files.
+    """Return the matrix (N, n), without unit, from modes of a link to modes of its pieces, both of the files.
 
-    Pieces are given by where they begin, m from the root, from the root to the tip. Planes of bending, twist and
-    stretch do not couple, so that their rigidities are of no account.
+    `pieces`: begin, m from the root, and modal body of each from root to tip. Bending planes, twist and stretch do not
+    couple, so that their rigidities do not matter.
     """
     return np.vstack([_shape_in_piece(link, start, piece) for start, piece in pieces])
 

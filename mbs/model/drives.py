@@ -1,4 +1,4 @@
-"""Forces of time that act on a robot beside gravity, elasticity and constraints. SI units."""
+"""Forces over time on a robot beside gravity, elasticity and constraints. SI units."""
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -9,23 +9,24 @@ from .._core import ForceSource, TimeFunction
 
 
 class Drive(NamedTuple):
-    """Force that is a function of time, N or N·m, and its generalized direction (n_v,)."""
+    """Force `size`, a function of time, N or N·m, along the generalized `direction` (n_v,)."""
 
     direction: Array
     size: TimeFunction
 
 
 class PointDrive(NamedTuple):
-    """Forces (N) and moments (N·m) of time on "BODY.POINT", by component ("x" … "mz"), global axes."""
+    """Forces (N) and moments (N·m) over time on "BODY.POINT", by component ("x" … "mz"), global axes."""
 
     point: str
     components: Mapping[str, TimeFunction]
 
 
 class Command(NamedTuple):
-    """Effect of a unit command: generalized forces `direction` (n_v,).
+    """Generalized forces `direction` (n_v,) of a unit command: 1 N·m, N or V.
 
-    Of motors on frames, not on sections, `frame` has the number of the body that the joint carries, and the sign.
+    For a motor that turns frames, not sections, `frame` has the number of the body that the joint carries, and the sign
+    of its torque there.
     """
 
     direction: Array
@@ -33,17 +34,17 @@ class Command(NamedTuple):
 
 
 class Replayed(NamedTuple):
-    """Inputs that an earlier analysis found: numbers over time from `source`, generalized forces of a unit of each."""
+    """Inputs over time that an earlier analysis found, N, N·m or V, and the generalized forces of a unit of each."""
 
-    source: ForceSource  # of the numbers, at any time
-    commands: tuple[Command, ...]  # what a unit of each does; of those at points nothing
-    # by "BODY.POINT" the number of each component ("x" … "mz"), global axes
+    source: ForceSource  # of all inputs, at any time
+    commands: tuple[Command, ...]  # effect of a unit of each input; 0 of those at points
+    # by "BODY.POINT" the index of the input of each component ("x" … "mz"), global axes
     at_points: Mapping[str, Mapping[str, int]] = MappingProxyType({})
-    # by joint those that act along its coordinates, N·m or N on its second side
+    # by joint the indices of inputs along its coordinates, N·m or N on its second side
     moments: Mapping[str, Sequence[int]] = MappingProxyType({})
-    # in the time of which the numbers at one time are found: those of a motion solved anew take longer
+    # time to find the inputs at one instant, in evaluations of the equations: longer if a motion is solved anew
     evaluations: float = 0.0
-    breaks: Sequence[float] = ()  # (n,) s, at which the numbers may jump
+    breaks: Sequence[float] = ()  # (n,) s, at which inputs may jump
     integrator: str = ""  # of the earlier analysis, where this run repeats its motion; else empty
 
 

@@ -1,4 +1,4 @@
-"""What sits in joints as they are built: friction along coordinates, geared rotors, compliant gears.
+"""Friction along joint coordinates, geared rotors, compliant gears.
 
 Motors behind compliant gears are coordinates of their own, with springs to those of the joints.
 """
@@ -19,9 +19,9 @@ from .tree import CompliantGear, KinematicTree
 
 
 def elastic_joints(model: Model) -> list[Node]:
-    """The nodes whose joints have compliant gears, in the order of the tree.
+    """Return the bodies whose inboard joints have compliant gears, in the order of the tree.
 
-    Raises `InputError` for such a gear in a joint without a motor of the tree.
+    Raises `InputError` for such a gear in a joint without a motor.
     """
     for joint in model.scene.joint:
         if getattr(joint, "stiffness", None) is not None and joint.name not in model.motors:
@@ -64,9 +64,9 @@ def with_compliance(model: Model) -> Model:
 
 
 def with_prescribed_motors(model: Model) -> Model:
-    """The robot with its gears where trajectories of motors are followed; the same where all gears are rigid.
+    """Return the robot with its compliant gears where trajectories prescribe motors; otherwise unchanged.
 
-    Raises `InputError` for trajectories of something else beside them: no motor could do both.
+    Raises `InputError` if other trajectories prescribe something else: no motor could do both.
     """
     if not any(path.motor for path in model.scene.trajectory):
         return model
@@ -114,12 +114,12 @@ def compliance(node: Node) -> tuple[TwistSpring, float] | None:
 
 
 def resistance(model: Model, q: Array, v: Array) -> Array:
-    """Return friction (T, n_v), N·m or N, in all joints."""
+    """Return friction (T, n_v), N·m or N, in all joints, cut ones too, at q (T, n_q) and v (T, n_v)."""
     return _of_frictions(model.tree, v, Friction.resistance) + model.along_cut.resistance(q, v)
 
 
 def tree_resistance_slope(tree: KinematicTree, v: Array) -> Array:
-    """Return the derivative (T, n_v), N·m·s/rad or N·s/m, of friction in each tree joint by its own rate."""
+    """Return the derivative (T, n_v), N·m·s/rad or N·s/m, of friction in each tree joint by its rate, at v (T, n_v)."""
     return _of_frictions(tree, v, Friction.slope)
 
 

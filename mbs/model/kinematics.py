@@ -1,4 +1,4 @@
-"""A tree in the core: bodies and sections as it takes them, and how it says that they move, in global axes."""
+"""A tree in the core: its bodies and sections, and their motion in global axes."""
 
 from __future__ import annotations
 
@@ -19,19 +19,20 @@ Placed = tuple[int, int]  # body, −1 the ground, and number of its marker
 
 
 class CutPlace(NamedTuple):
-    """Location of the coordinate of a cut joint: where it is measured and where forces along it act."""
+    """Coordinate of a cut joint: the sections between which it is measured and forces along it act."""
 
-    # a, b: its sections, by numbers of wrenches
+    # a, b: indices of the sections among `ModelParts.wrenches`
     a: int
     b: int
-    turns: bool  # whether it is an angle
-    axis: Array  # (3,) of it, in axes of a
+    turns: bool  # whether the coordinate is an angle
+    axis: Array  # (3,) unit vector along or about which it is measured, in axes of a
 
 
 class ModelParts(NamedTuple):
-    """A mechanism in space as the core takes it; SI units.
+    """Input of the core for a mechanism in space; SI units.
 
-    `wrenches` are the markers on which forces act, `cut` joints at which loops are cut and along which something acts.
+    Forces act on the markers `wrenches`, and along the coordinates `cut` of joints at which loops are cut. `gravity`
+    (3,), m/s².
     """
 
     bodies: list[_core.SpatialBody]
@@ -46,8 +47,8 @@ class Markers:
     """Markers on bodies of a tree and on the ground, created on request.
 
     Attributes:
-        of_bodies: sections of each body, by the numbers of its markers.
-        turning: numbers of the ground's markers that follow a law in time, with it.
+        of_bodies: sections of each body, in the order of its markers.
+        turning: index among markers of the ground, and law in time, of each that has one.
     """
 
     def __init__(self, nodes: Sequence[Node]) -> None:
@@ -58,7 +59,7 @@ class Markers:
         self._sides = [(self.place(node.inner), self.place(node.outer)) for node in nodes]
 
     def place(self, section: Section) -> Placed:
-        """Body (−1: the ground) and number of the marker of a section there; made where it is new."""
+        """Return index of the body (−1: ground) and, on it, of the marker of a section, which is made if new."""
         known = self._ground if section.body < 0 else self.of_bodies[section.body]
         for number, other in enumerate(known):
             same = other.point == section.point and other.still == section.still
@@ -68,7 +69,7 @@ class Markers:
         return section.body, len(known) - 1
 
     def row(self, row: ConstraintRow) -> _core.ConstraintModel:
-        """A row of constraints between markers."""
+        """Return the core's record of a constraint equation between markers."""
         row_model = _core.ConstraintModel()
         row_model.name, row_model.kind = row.owner, getattr(_core.ConstraintKind, row.kind)
         if row.kind == "coordinate":
@@ -130,7 +131,10 @@ def moves(node: Node) -> bool:
 
 
 def rows_of(body: Body, section: Section) -> tuple[Array, Array, list[Array]]:
-    """Return Φ over Φ_r (6, n), 1/√kg and 1/(√kg·m), position (3,), m, of a section; six K (n, n) if it has any."""
+    """Return Φ over Φ_r (6, n), 1/√kg and 1/(√kg·m), position (3,), m, of a section; and its `Stiffening.K_points`.
+
+    These are six matrices (n, n), or none.
+    """
     if not section.point:
         return np.zeros((6, body.n_modes)), np.zeros(3), []
     at = body.points[section.point]
@@ -183,7 +187,7 @@ class Motion(NamedTuple):
 
 
 class Kinematics:
-    """Kinematic model of a tree in the core, without loads, for given sections and constraint rows. SI units."""
+    """Kinematic model of a tree in the core, without loads, with sections and constraint equations (rows). SI units."""
 
     def __init__(
         self, nodes: Sequence[Node], sections: Sequence[Section] = (), rows: Sequence[ConstraintRow] = ()
@@ -200,7 +204,7 @@ class Kinematics:
     def of_points(cls, nodes: Sequence[Node]) -> Kinematics:
         """Make the kinematics of frames and points of all bodies, and of sections at joints.
 
-        The core takes outputs of rotors, which have no mass, without sections: their frames are where it has them.
+        Outputs of rotors, which have no mass, have no sections in the core, but frames at the same places.
         """
         still = [side for node in nodes for side in (node.inner, node.outer) if side.still and side.body >= 0]
         points = [
@@ -218,17 +222,17 @@ class Kinematics:
         )
 
     def values(self, q: Array, times: Array) -> tuple[Array, Array]:
-        """C (T, rows), m or rad, at q (T, n_q) and `times` (T,), s, and its Jacobian C_v (T, rows, n_v)."""
+        """Return C (T, rows), m or rad, at q (T, n_q) and `times` (T,), s, and its Jacobian C_v (T, rows, n_v)."""
         values, gradients = self.core.constraints(self.scene, times.tolist(), q)
         return self.signs * values, self.signs[:, None] * gradients.reshape(len(q), len(self.signs), self.core.n_v)
 
     def rates(self, q: Array, v: Array, times: Array) -> Array:
-        """Ċ (T, rows), m/s or rad/s, at q (T, n_q), v (T, n_v) and `times` (T,), s."""
+        """Return Ċ (T, rows), m/s or rad/s, at q (T, n_q), v (T, n_v) and `times` (T,), s."""
         return self.signs * self.core.constraint_rates(self.scene, times.tolist(), q, v)
 
 
 class Places:
-    """Positions and motions of frames and sections of a tree over states."""
+    """Positions and velocities of frames and sections of a tree over T states."""
 
     def __init__(self, numbers: dict[tuple[object, ...], int], motions: Array) -> None:
         """`numbers` of sections in `motions` (T, frames and sections, 18)."""

@@ -1,4 +1,4 @@
-"""What motions in 3D that are known take, as the core's recursive Newton–Euler algorithm finds it. SI units."""
+"""Forces of known motions in 3D by the core's recursive Newton–Euler algorithm. SI units."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from .system import MultibodySystem
 
 
 class Wrench(NamedTuple):
-    """Force (N) and moment (N·m) (T, 3), global axes."""
+    """Force (T, 3), N, and moment (T, 3), N·m, global axes."""
 
     force: Array
     moment: Array
 
     def seen_from(self, arm: Array) -> Wrench:
-        """Return the wrench about a point at `arm` (T, 3), m, from the present one."""
+        """Return the wrench about another point, from which the present one is at `arm` (T, 3), m, global axes."""
         return Wrench(self.force, self.moment + np.cross(arm, self.force))
 
     def plus(self, other: Wrench, sign: float = 1.0) -> Wrench:
-        """The sum, or with sign −1 the difference."""
+        """Return the sum of both wrenches, or with sign −1 the difference."""
         return Wrench(self.force + sign * other.force, self.moment + sign * other.moment)
 
 
@@ -39,7 +39,7 @@ class State:
 
 
 class States(Protocol):
-    """States q (T, n_q), v and a (T, n_v) of a tree."""
+    """States q (T, n_q), v and a (T, n_v) of a tree: m, rad, √kg·m and these per s and s²."""
 
     @property
     def q(self) -> Array:
@@ -47,11 +47,11 @@ class States(Protocol):
 
     @property
     def v(self) -> Array:
-        """Velocities (T, n_v), rad/s, m/s."""
+        """Velocities v (T, n_v), rad/s, m/s and m·√kg/s."""
 
     @property
     def a(self) -> Array:
-        """Accelerations (T, n_v)."""
+        """Accelerations a (T, n_v), rad/s², m/s² and m·√kg/s²."""
 
 
 class KnownStates(NamedTuple):
@@ -63,11 +63,11 @@ class KnownStates(NamedTuple):
 
 
 class SectionMotion(NamedTuple):
-    """Acceleration (m/s²), angular acceleration and velocity (rad/s², rad/s) (T, 3) of a triad, global axes."""
+    """Motion of a triad, each (T, 3), global axes."""
 
-    a: Array
-    alpha: Array
-    omega: Array
+    a: Array  # acceleration, m/s²
+    alpha: Array  # angular acceleration, rad/s²
+    omega: Array  # angular velocity, rad/s
 
 
 @struct
@@ -88,13 +88,13 @@ class MotionForces:
         return Wrench(on_section.force, on_section.moment + self.of_rotor(number))
 
     def of_rotor(self, number: int) -> Array:
-        """Rate (T, 3), N·m, of the angular momentum of the rotor in the joint that carries body no. `number`."""
+        """Return the rate (T, 3), N·m, of the angular momentum of the rotor in the joint that carries body `number`."""
         return self.found.rotors[:, 3 * number : 3 * number + 3]
 
     def carried(self, q: Array) -> list[Wrench]:
-        """Return reactions, N and N·m, of all joints about their outer sides, at q (T, n_q); no forces that do work.
+        """Return reactions, N and N·m, of joints about their outer sides, at q (T, n_q), without forces that do work.
 
-        What drives, loads and brakes joints along their coordinates does the rest.
+        Torques of motors, loads and friction along joint coordinates do work, and are left out.
         """
         numbers = range(len(self.system.model.tree.nodes))
         of_joints = np.hstack([part for number in numbers for part in self.of_joint(number)])
@@ -102,7 +102,7 @@ class MotionForces:
         return [_wrench(table, number) for number in numbers]
 
     def of_row(self, number: int) -> tuple[Wrench, Wrench]:
-        """Return the wrenches of row no. `number` on its sections a and b; zero for a joint coordinate of the tree."""
+        """Return the wrenches of constraint equation `number` on its sections a and b; 0 for joint coordinates."""
         return _wrench(self.found.constraints, 2 * number), _wrench(self.found.constraints, 2 * number + 1)
 
     @cached_property
@@ -131,20 +131,23 @@ def _motion(table: Array, number: int) -> SectionMotion:
 
 
 def motion_forces(system: MultibodySystem, states: States, times: Array, multipliers: Array) -> MotionForces:
-    """Return forces under multipliers (T, rows), N or N·m, and all given forces at `times` (T,), s."""
+    """Return forces of a motion under multipliers (T, rows), N or N·m, and all given forces at `times` (T,), s."""
     of_core = multipliers * system.model.row_signs
     forces = system.core.motion_forces(system.scene, times.tolist(), states.q, states.v, states.a, of_core)
     return MotionForces(system, forces)
 
 
 def multiplier_forces(system: MultibodySystem, q: Array, times: Array, multipliers: Array) -> MotionForces:
-    """Return forces in joints and constraints of multipliers (T, rows), N or N·m, alone."""
+    """Return forces in joints and constraints by multipliers (T, rows), N or N·m, alone, at `times` (T,), s."""
     forces = system.core.multiplier_forces(system.scene, times.tolist(), q, multipliers * system.model.row_signs)
     return MotionForces(system, forces)
 
 
 def rotor_torques(model: Model, states: States, times: Array) -> Array:
-    """Return J u̇ (T, bodies), N·m, about the axis of each rotor, by the body outboard of its joint."""
+    """Return inertia times angular acceleration (T, bodies), N·m, of the rotor in each body's inboard joint; else 0.
+
+    In prismatic joints it is J N γ̈ of the coordinate alone. `times` (T,), s.
+    """
     tree, system = model.tree, MultibodySystem(model)
     forces = motion_forces(system, states, times, np.zeros((len(times), len(model.rows))))
     places, torque = tree.places(states.q), np.zeros((len(times), len(tree.nodes)))
@@ -159,19 +162,19 @@ def rotor_torques(model: Model, states: States, times: Array) -> Array:
 
 
 def required_forces(model: Model, state: States, times: Array) -> Array:
-    """Inverse dynamics M v̇ − Q (T, n_v), N, N·m, N/√kg; Q: gravity, elasticity, friction, the scene's loads."""
+    """Return M v̇ − Q (T, n_v), N, N·m, N/√kg, at `times` (T,), s; Q: gravity, elasticity, friction, scene's loads."""
     system = MultibodySystem(model)
     return system.core.required_forces(system.scene, times.tolist(), state.q, state.v, state.a)
 
 
 def row_accelerations(system: MultibodySystem, state: States, times: Array) -> Array:
-    """Acceleration error C̈ (T, rows), m/s² or rad/s², of constraints and their targets at `times` (T,), s."""
+    """Return accelerations C̈ (T, rows), m/s² or rad/s², of constraints against their targets at `times` (T,), s."""
     of_core = system.core.row_accelerations(system.scene, times.tolist(), state.q, state.v, state.a)
     return of_core * system.model.row_signs
 
 
 def mass_matrices(model: Model, q: Array, t: float = 0.0) -> Array:
-    """Mass matrices M (T, n_v, n_v), kg, kg·m², 1 of modes, at q (T, n_q), from forces of unit accelerations."""
+    """Return mass matrices (T, n_v, n_v), kg, kg·m², 1 of modes, at q (T, n_q), by forces of unit accelerations."""
     T, n = len(q), model.tree.n_v
     system, a = MultibodySystem(model), np.tile(np.vstack([np.zeros(n), np.eye(n)]), (T, 1))
     states = np.repeat(q, n + 1, axis=0), np.zeros((T * (n + 1), n)), a

@@ -1,10 +1,7 @@
-"""Masses attached to sections of bodies: payloads, and what lies along a beam. SI units.
+"""Masses attached to sections of bodies: payloads, and line masses along a beam. SI units.
 
-Payloads that sections of links turn: rigid bodies, welded to them.
-
-The section turns by exp(φ~), φ = Φ_r p, and they with it: a body of its own in the tree, with the frame at the section
-and no freedom, is exact, whatever inertia it has. What rigid bodies carry, and point masses on sections, are exact as
-parts of their body.
+A payload rotates with its section by exp(φ~), φ = Φ_r p. A body of its own, welded to the section, is exact whatever
+inertia it has. Payloads of rigid bodies, and point masses on sections, are exact as parts of their body.
 """
 
 from collections.abc import Iterator, Sequence
@@ -22,13 +19,13 @@ from .body import Body, BodyPoint, rigid_body, transformed
 
 
 def turns_as_a_body(scene: MechanismKeys, payload: Payload) -> bool:
-    """Whether turning its section moves it: all but a point mass there, in the plane with its moment of inertia."""
+    """Whether rotation of its section matters to the payload: not to a point mass there (planar: any mass there)."""
     is_beside = payload.mass and np.any(payload.center)
     return bool(is_beside or (np.any(payload.inertia) and not scene.is_planar))
 
 
 def welded_payloads(scene: MechanismKeys) -> Iterator[tuple[Body, WeldJoint]]:
-    """Payloads modelled as rigid bodies, each with the weld to its link; their names are none a scene can use."""
+    """Yield payloads that are rigid bodies of their own, with welds to their links; no scene can have their names."""
     rigid = {body.name for body in scene.body if body.rigid is not None}
     for k, payload in enumerate(scene.payload, 1):
         if turns_as_a_body(scene, payload) and payload.point.partition(".")[0] not in rigid:
@@ -60,9 +57,9 @@ def with_payload(body: Body, point: str, mass: float, center: Array, inertia: Ar
 
 
 def with_line_masses(body: Body, points: Sequence[BodyPoint], masses: Array, spins: Array, stiffness: Array) -> Body:
-    """Add masses (kg) at sections on the body's axis, and stiffness (n, n): strips along a beam, for instance.
+    """Add masses (k,), kg, at sections `points` near the body's axis, and stiffness (n, n), rad²/s², of strips on it.
 
-    They have moments of inertia `spins` (kg·m²) about the axis alone, as a line of mass has: J_s, h_s, S_s.
+    They have moments of inertia `spins` (k,), kg·m², about the axis alone, as a line of mass has: J_s, h_s, S_s.
     """
     m_ff, loaded = np.eye(body.n_modes), body
     for at, mass, spin in zip(points, masses, spins, strict=True):
@@ -83,11 +80,11 @@ def _uncoupled(body: Body, m_ff: Array, added: Array | None = None) -> Body:
 
 
 def uncoupling(M: Array, K: Array) -> tuple[Array, Array]:
-    """Return T (n, n) with TᵀMT = 1 and TᵀKT = diag(stiffness), and that stiffness (n,), rad²/s².
+    """Return T (n, n) with TᵀMT = 1 and TᵀKT = diag(stiffness), and this stiffness (n,), rad²/s², of n modes.
 
-    Modes that do not feel each other stay apart, so that the coordinates keep their families: those of a round link
-    that bend it in one plane and the other, with equal frequencies, are not mixed. Those that do are in ascending order
-    in the places that they had.
+    Modes that M (n, n), without unit, and K (n, n), rad²/s², do not couple are not mixed, so that they keep their
+    families: those of a round link in two planes, with equal frequencies, stay apart. Coupled ones are in ascending
+    order in the places that they had.
     """
     T, stiffness = np.zeros_like(M), np.zeros(len(M))
     for block in coupled_blocks(M, K):
@@ -99,7 +96,7 @@ def uncoupling(M: Array, K: Array) -> tuple[Array, Array]:
 
 
 def coupled_blocks(*matrices: Array) -> list[Indices]:
-    """Return numbers of modes that any of the matrices (n, n) couples, set by set."""
+    """Return sets of indices of modes (any,) that any of the `matrices` (n, n), of any unit, couples."""
     coupled = np.eye(len(matrices[0]), dtype=bool)
     for matrix in matrices:
         scale = np.sqrt(np.diag(matrix))

@@ -1,4 +1,4 @@
-"""A robot as analyses share it: tree and constraint rows, with their natural sizes. SI units."""
+"""The model of a robot that analyses share: tree and constraint equations, with natural sizes. SI units."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LARGEST_TURN = 0.5  # rad (and sizes of the robot) that a Newton step may move: 
 
 
 class Constraints(Kinematics):
-    """Equations C(q, t) = 0 of all rows of a model, SI."""
+    """Constraint equations C(q, t) = 0 of a model, one for each of its `rows`, SI."""
 
     def __init__(self, model: Model) -> None:
         super().__init__(model.tree.nodes, rows=model.rows)
@@ -44,17 +44,17 @@ class Constraints(Kinematics):
         return [row.owner for row in turning], Kinematics(self.nodes, rows=turning)
 
     def natural_gradients(self, q: Array, times: Array, sizes: Array | None = None) -> Array:
-        """Return C_v (T, rows, n_v) at q (T, n_q) and `times` (T,), rows in natural sizes and coordinates in `sizes`.
+        """Return C_v (T, rows, n_v), without unit, so that its rank has none either, at q (T, n_q) and `times` (T,), s.
 
-        Those of joints by default. Its rank does not depend on units.
+        Equations are relative to their natural sizes, coordinates to `sizes` (n_v,), by default those of joints.
         """
         sizes = self._joint_sizes if sizes is None else sizes
         return self.values(q, times)[1] * sizes / self._row_sizes[:, None]
 
     def turned_over(self, q: Array, times: Array) -> dict[str, Booleans]:
-        """Return, by loop joint and tool axis, at which of q (T, n_q) and `times` (T,), s, it is turned by π.
+        """Return by name (T,) whether a loop joint or tool axis is turned by π at q (T, n_q) and `times` (T,), s.
 
-        Its "dot" rows are 0 there, too: they leave open which way the axes point that they align.
+        Its "dot" equations are 0 there, too: they do not determine in which sense axes are parallel.
         """
         owners, senses = self._senses
         if not owners:
@@ -63,15 +63,15 @@ class Constraints(Kinematics):
         return {owner: against[:, [other == owner for other in owners]].any(axis=1) for owner in owners}
 
     def posture(self, q: Array, t: float, locked: Booleans | None = None) -> Array | None:
-        """Return the posture (n_q,) next to q (n_q,) at t (s), as `postures`; None without convergence."""
+        """Project q (n_q,), SI, onto C(q, t) = 0 at t (s), as `postures`; None without convergence."""
         solved, is_met = self.postures(q[None], np.array([t]), locked)
         return solved[0] if is_met[0] else None
 
     def postures(self, q: Array, times: Array, locked: Booleans | None = None) -> tuple[Array, Booleans]:
-        """Project q (T, n_q) onto C(q, t) = 0 at `times` (T,), s; with flags (T,) of convergence.
+        """Project q (T, n_q), SI, onto C(q, t) = 0 at `times` (T,), s; return it and flags (T,) of convergence.
 
-        By least steps of joints not `locked` (n_v,). A solution with a joint or tool axis turned by π does not count as
-        converged.
+        Joints not `locked` (n_v,) move by least steps. A solution with a joint or tool axis turned by π does not count
+        as converged.
         """
         moved, left = self.moved(q, times, locked=locked)
         is_met = left <= MET
@@ -82,10 +82,10 @@ class Constraints(Kinematics):
     def moved(
         self, q: Array, times: Array, beside: Array | None = None, locked: Booleans | None = None
     ) -> tuple[Array, Array]:
-        """Project q (T, n_q) onto C = `beside` (T, rows), default 0, at `times` (T,); returned with residuals (T,).
+        """Project q (T, n_q) onto C = `beside` (T, rows), SI, default 0, at `times` (T,), s; with residuals (T,).
 
-        By Newton's method with the least steps of joints not `locked` (n_v,); modal coordinates stay. What is left is
-        in terms of natural sizes, NaN where it is not finite.
+        Newton's method takes least steps of joints not `locked` (n_v,); modal coordinates stay. Residuals are relative
+        to natural sizes, NaN where not finite.
         """
         more = np.zeros((0, 0)) if beside is None else self.signs * beside
         scales = self._joint_sizes if locked is None else np.where(locked, 0.0, self._joint_sizes)
@@ -98,9 +98,10 @@ class Constraints(Kinematics):
 
 @struct
 class Model:
-    """A scene in space with its bodies: everything analyses share. SI units.
+    """A scene in space with its bodies, which all analyses share. SI units.
 
-    `cut` are the coordinates of joints at which loops are cut; `modal_loads` act beside the loads of the scene.
+    `rows` are the constraint equations, `cut` coordinates of joints at which loops are cut; `modal_loads` act beside
+    the loads of the scene.
     """
 
     scene: MechanismScene
@@ -111,17 +112,17 @@ class Model:
 
     @property
     def loop_rows(self) -> Booleans:
-        """Whether rows (rows,) close loops."""
+        """Whether constraint equations (rows,) close loops."""
         return np.array([not row.is_trajectory for row in self.rows], dtype=bool)
 
     @property
     def row_signs(self) -> Array:
-        """Signs (rows,): −1 if the core's row counts the tree's coordinate, not the joint's."""
+        """Signs (rows,): −1 where the core's equation has the coordinate of a reversed joint, else 1."""
         return np.array([row.sign for row in self.rows])
 
     @cached_property
     def constraints(self) -> Constraints:
-        """The constraint rows in the core."""
+        """Constraint equations in the core."""
         return Constraints(self)
 
     @cached_property
@@ -131,16 +132,16 @@ class Model:
 
     @cached_property
     def motors(self) -> dict[str, Array]:
-        """Indices in v of motor coordinates by joint, in the scene's order."""
+        """Indices (k,) in v of the k motor coordinates of each joint, in the scene's order."""
         return {joint.name: _in_order(self.driven(joint.name)) for joint in self.scene.motor_joints}
 
     @property
     def motor_columns(self) -> Indices:
-        """Indices in v of all motor coordinates."""
+        """Indices (motors,) in v of all motor coordinates."""
         return np.array([column for columns in self.motors.values() for column in columns], dtype=np.intp)
 
     def by_motor(self, values: Array) -> dict[str, Array]:
-        """Return columns of `values` (…, motors and any others), in their unit, by joint with motors."""
+        """Return columns (…, k) of `values` (…, motors and any others), of any unit, by joint with motors."""
         motors = self.motors
         parts = np.split(values, np.cumsum([len(columns) for columns in motors.values()]), axis=-1)
         return dict(zip(motors, parts[:-1], strict=True))
@@ -150,12 +151,12 @@ class Model:
         return _in_order(self.tree.nodes[self.tree.carried[joint]])
 
     def joint_of(self, row: ConstraintRow) -> str:
-        """The joint of the scene whose coordinate, or whose motor's, a "coordinate" row measures."""
+        """Return the scene's joint whose coordinate, or whose motor's, a constraint equation prescribes."""
         behind = {gear.motor.v.start: gear.joint.joint.name for gear in self.tree.gears}
         return behind.get(row.coordinate, self.tree.nodes[row.b.body].joint.name)
 
     def measures_way(self, row: ConstraintRow) -> bool:
-        """Whether a constraint row is a length, m; others are angles, rad, or their cosines."""
+        """Whether a constraint equation is in m; others are in rad, or cosines."""
         if row.kind == "coordinate":
             return self.tree.nodes[row.b.body].joint.units == ("m",)
         return row.kind in ("point", "slide")
@@ -174,13 +175,13 @@ class Model:
         return behind.get(joint, self.tree.nodes[self.tree.carried[joint]])
 
     def without_paths(self) -> Model:
-        """The robot alone: joints hold, nothing is followed."""
+        """Return the robot without trajectories, with constraint equations of loops alone."""
         return replace(self, rows=tuple(row for row in self.rows if not row.is_trajectory))
 
     def modal_directions(self, on_modes: Mapping[str, Array]) -> Array:
-        """Return directions (k, n_v) along v of k forces (n, k), N/√kg, on the modes of files of bodies.
+        """Return generalized forces (k, n_v) of k forces (n, k), N/√kg, on the modes of files by body.
 
-        Gradients of what depends on modal coordinates are alike.
+        Gradients of functions of modal coordinates, too, become gradients along v.
         """
         (count,) = {forces.shape[1] for forces in on_modes.values()}
         directions = np.zeros((count, self.tree.n_v))
@@ -191,7 +192,7 @@ class Model:
 
     @cached_property
     def size(self) -> float:
-        """A length (m) of the robot: the largest distance of two named points of a body, or 1 m without any."""
+        """Size of the robot, m: the largest distance of two named points of a body, or 1 m without any."""
         sizes = [
             float(np.linalg.norm(at.position - other.position))
             for node in self.tree.nodes
@@ -217,7 +218,7 @@ class Model:
 
     @cached_property
     def natural_sizes(self) -> Array:
-        """Natural sizes (n_v,): 1 rad or the robot's size for joints, √J for modes."""
+        """Natural sizes (n_v,): 1 rad or the robot's size, m, for joints, √J for modes (`Body.largest_moment` J)."""
         sizes = self.joint_sizes.copy()
         for node in self.tree.nodes:
             sizes[node.p_v] = np.sqrt(node.body.largest_moment)

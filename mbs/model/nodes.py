@@ -1,4 +1,4 @@
-"""What trees are made of: bodies on their joints, sections of bodies, and rows of constraints between these."""
+"""Parts of trees: bodies on their joints, sections of bodies, and constraint equations between these."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -15,7 +15,7 @@ from .body import Body
 
 
 class Section(NamedTuple):
-    """A triad (3, 3), columns, on a section of body number `body`, or standing at `position` (m) on the ground (−1).
+    """A triad (3, 3), columns, on section `point` of body no. `body`, or at `position` (3,), m, on the ground (−1).
 
     `still`: about its z it turns with the frame of the body, not with the section.
     """
@@ -27,7 +27,7 @@ class Section(NamedTuple):
     still: bool = False
 
     def turned(self, rotation: Array) -> Array:
-        """Return the rotation of the section by modes, from rotations (…, 3, n), or (…, 3) with a last axis of one."""
+        """Return the rotation (…, 3, n), rad, of the triad from that of the section: without z if `still`."""
         if not self.still:
             return rotation
         z = self.triad[:, 2]
@@ -39,14 +39,15 @@ class Node:
     """A body with its inboard joint."""
 
     body: Body  # its constants
-    # that carries it; where the scene has none a free one at the origin, in planar scenes a planar one
+    # inboard joint; where the scene has none a free one at the origin, in planar scenes a planar one
     joint: JointRecord
     backwards: bool  # whether the joint's first side is on this body
-    inner: Section  # the joint's triad on what carries it
+    inner: Section  # the joint's triad on the parent
     outer: Section  # its triad on this body
-    q: slice  # where the joint's coordinates stand in q
-    p_q: slice  # and those of the modes
-    v: slice  # likewise in v
+    # places of the joint's coordinates in q and v, and of modal coordinates
+    q: slice
+    p_q: slice
+    v: slice
     p_v: slice
 
     @property
@@ -55,13 +56,13 @@ class Node:
         return -1.0 if self.backwards else 1.0
 
     def coordinates(self, q: Array) -> Array:
-        """Return the joint's coordinates (…, k) in the scene's order, at q (…, n_q)."""
+        """Return the joint's coordinates (…, k), rad or m, in the scene's order, at q (…, n_q)."""
         own = self.joint.coordinates(q[..., self.q])
         return self.joint.turned_around(own) if self.backwards else own
 
 
 def rotor(node: Node) -> tuple[float, float]:
-    """Inertia J (kg·m²) of the rotor in the joint that carries a body, 0 without one, and its ratio N."""
+    """Return the inertia J (kg·m²) of the rotor in the inboard joint of a body, 0 without one, and its gear ratio N."""
     return float(getattr(node.joint, "rotor_inertia", 0.0)), float(getattr(node.joint, "gear_ratio", 1.0))
 
 
@@ -70,33 +71,32 @@ ConstraintKind = Literal["point", "slide", "dot", "rotation", "turn", "coordinat
 
 @struct
 class ConstraintRow:
-    """One constraint: a measure of section b on section a that follows `target`, or is 0."""
+    """One constraint equation: a measure of section b relative to section a equals `target`, or 0."""
 
     owner: str  # the joint or trajectory
     # "point", f·(r_b − r_a) with f in global axes; "slide", the same with f in axes of a; "dot", f·g with f in axes of
     # a and g in axes of b; "rotation", the turn of b against a about f, global axes; "turn", the angle of g of b about
-    # f of a, unit vectors across each other in axes of both; "coordinate", the joint coordinate v[coordinate], `sign`
-    # times
+    # f of a, unit vectors across each other in axes of both; "coordinate", `sign` times the joint coordinate
     kind: ConstraintKind
     a: Section
     b: Section
     f: Array
     g: Array
     is_trajectory: bool = True
-    # in v; of "turn" and "slide" rows it is taken off, where there is one
+    # index in v; "turn" and "slide" subtract this coordinate, if it is not −1
     coordinate: int = -1
     sign: float = 1.0
     target: TimeFunction | None = None  # of points, angles and coordinates
-    # an orientation in time: of "rotation" rows that of a, whose triad is then A(t); of "dot" rows that of b
+    # orientation over time: in "rotation" that of a, whose triad is then A(t); in "dot" that of b
     law: OrientationLaw | None = None
 
 
 def rows_of_joint(
     owner: str, node: Node, columns: Array, targets: Sequence[TimeFunction | None], sign: float = 1.0
 ) -> list[ConstraintRow]:
-    """Return the rows by which `sign` · v[`columns`] of a node's joint follow `targets`.
+    """Return the equations by which coordinates of a node's joint, `sign` · v[`columns`] (k,), follow k `targets`.
 
-    Of planar joints between its sections, `sign` 1: the core prescribes no coordinates whose axes turn.
+    For planar joints they are between sections, with `sign` 1, as the core prescribes no coordinates whose axes turn.
     """
     if node.joint.type != "planar":
         row = ConstraintRow(owner, "coordinate", node.inner, node.outer, np.zeros(3), np.zeros(3), sign=sign)

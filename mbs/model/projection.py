@@ -1,14 +1,13 @@
-"""Bodies of planar scenes: of their motion what is in the plane z = 0 of their frames, by declaration.
+"""Bodies of planar scenes, projected on the plane z = 0 of their frames; mechanisms that move in a plane.
 
-What a mode moves across the plane keeps its share of m_ff = 1. Of masses the plane sees affine fields of displacement
+Displacements of modes across the plane keep their share of m_ff = 1. Masses matter in the plane by affine displacements
 that keep shapes alone: translations along x and y, an expansion (x, y) and a rotation (−y, x). A body gets the
-integrals of a mass that is as wide along x as along y about its center, in which these are all there are: then
-geometric stiffening, which is by affine fields, is the same in 3D.
+integrals of a mass that is as wide along x as along y about its center, which has no others: then geometric stiffening,
+which is by affine fields, is the same in 3D.
 
-Mechanisms that move in a plane are solved there, with the same q, v and forces along them: all joints turn about its
-normal or slide in it, bodies bend in it. What is across it does no work: offsets of points and masses, forces, and rows
-that close loops, which hold by themselves. Joints carry it all the same: reactions (`quantities/reactions.py`) follow
-from the motion, with the masses where they are in space.
+Mechanisms whose joints all turn about the normal of a plane or slide in it, and whose bodies bend in it, are solved in
+the plane, with the same q, v and forces along them. Offsets, forces and loop equations across it do no work. Reactions
+(`quantities/reactions.py`) follow from the motion, with masses and forces in space.
 """
 
 from collections.abc import Iterator, Sequence
@@ -29,7 +28,7 @@ PLANE, TURN = np.diag(ALONG), np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0,
 
 
 def projected(body: Body) -> Body:
-    """A body without its motion across the plane z = 0 of its frame, and without modes that have no other."""
+    """Return a body without motion across the plane z = 0 of its frame, and without modes that move only across it."""
     moving = np.flatnonzero(np.einsum("kknn->n", body.S_bar_kl[:2, :2]) > IMMOBILE)
     kept = transformed(body, np.eye(body.n_modes)[:, moving], body.stiffness[moving])
     center = kept.first_moment * ALONG / kept.mass
@@ -64,7 +63,7 @@ def projected(body: Body) -> Body:
 
 
 def vanishing_in_plane(body: Body) -> tuple[str, ...]:
-    """Return names of terms that are round-off in the planar equations of a body; none of a rigid one."""
+    """Return names of terms (D_ff, j, S_tilde) that are round-off in planar equations of a body; none if rigid."""
     if not body.n_modes:
         return ()
     size = np.sqrt(body.mass) * max((float(np.linalg.norm(at.position)) for at in body.points.values()), default=0.0)
@@ -105,9 +104,10 @@ def axes_across(normal: Array) -> Array:
 
 
 def axes_of_triad(normal: Array) -> Array:
-    """Return axes (3, 3) of a planar marker, rows x, y and the normal, in axes of the triad it stands for.
+    """Return axes (3, 3) of a planar marker, rows x, y and the normal, in axes of its triad in space.
 
-    Revolute and planar joints have z along the normal and keep x and y, prismatic ones slide along z: it becomes x.
+    Triads of revolute and planar joints have z along the normal and keep x and y. Prismatic joints slide along z, which
+    becomes x.
     """
     if abs(normal[2]) >= UPRIGHT:
         return axes_across(normal)
@@ -207,23 +207,23 @@ SHARED = ("name", "parent", "parent_marker", "inboard_marker", "rotor_inertia", 
 class Plane(NamedTuple):
     """A mechanism of the core in the plane; SI units."""
 
-    model: _core.PlanarModel  # of it
-    axes: Array  # (3, 3) rows: its axes x and y and its normal, global axes
-    followed: Integers  # by its rows: which row of the mechanism in space says what they follow
-    # (rows in space, its rows) multipliers of the rows in space by its own; 0 of those that do nothing in it
+    model: _core.PlanarModel
+    axes: Array  # (3, 3) rows: axes x and y of the plane and its normal, global axes
+    followed: Integers  # of each constraint equation in the plane: index of that in space with its target
+    # (equations in space, equations in the plane) from multipliers in the plane to those in space
     spread: Array
     # joints at which loops are cut, with axes of planar markers: of angles the component along the normal
     cut: tuple[CutPlace, ...]
 
     def shares(self, component: int) -> list[tuple[int, float]]:
-        """Return components and shares of a planar wrench for a global force (0, 1, 2) or moment (3, 4, 5)."""
+        """Return planar components (0, 1: force, 2: moment), with shares, of a global force (0–2) or moment (3–5)."""
         along = self.axes[:, component % 3]
         parts = [(2, along[2])] if component >= 3 else [(0, along[0]), (1, along[1])]
         return [(k, float(share)) for k, share in parts if abs(share) > EXACT]
 
 
 def in_plane(parts: ModelParts, is_path: Booleans) -> Plane | None:
-    """Return the mechanism in its plane; None without one. `is_path` (rows,): rows that must be kept."""
+    """Return the mechanism in its plane; None without one. `is_path` (rows,): equations that must be kept."""
     if any(marker.turns for marker in parts.ground) or not all(body.joint in PLANAR for body in parts.bodies):
         return None
     frames = _frames(parts)

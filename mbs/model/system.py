@@ -1,6 +1,6 @@
-"""The equations of motion of a scene under its constraints, as the core's recursion evaluates them.
+"""The equations of motion of a scene under its constraints, as the core's recursion evaluates them. SI units.
 
-And what motors and modal forces do in place of the forces on a path: the split of generalized forces. SI units.
+Also the split of generalized forces: motor torques and modal forces in place of the forces on a path.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,7 +24,7 @@ from .projection import Plane, in_plane
 
 
 class Integrated(NamedTuple):
-    """Mechanism of the core, its loads and targets, and the numbers of its rows in the model."""
+    """Mechanism of the core, its loads and targets (`scene`), and indices in the model of its constraint equations."""
 
     core: _core.PlanarModel | _core.SpatialModel
     scene: _core.TreeScene
@@ -32,14 +32,14 @@ class Integrated(NamedTuple):
 
 
 class MultibodySystem:
-    """A core model of a tree with the rows of its constraints; states (q, v) are those of the tree. SI units.
+    """A tree with its constraint equations (rows) in the core; states (q, v) are those of the tree. SI units.
 
-    Rows of coordinates are those of the tree in the core, `sign` times the scene's: they follow `sign` times the
-    target, and their multipliers are `sign` times those of `Model.rows`.
+    In the core equations of joint coordinates have those of the tree, `ConstraintRow.sign` times the scene's: targets
+    and multipliers are `sign` times those of `Model.rows`.
 
     Attributes:
-        model: what it was made from.
-        replayed: what an earlier analysis found, to act again.
+        model: the model from which it is made.
+        replayed: inputs that an earlier analysis found; None without any.
     """
 
     def __init__(self, model: Model, drives: Drives = NO_DRIVES, commands: Sequence[Command] = ()) -> None:
@@ -84,14 +84,14 @@ class MultibodySystem:
 
     @cached_property
     def scene(self) -> _core.TreeScene:
-        """Functions that rows of `core` follow, and given loads."""
+        """Targets of the constraint equations of `core`, and given loads."""
         return self._follow(None)
 
     @cached_property
     def plane(self) -> Plane | None:
         """The plane that contains all motion, with the same q and v; None without one.
 
-        Forces of the motion of points may lead out of it, but for those of scenes in the plane.
+        Forces that depend on the motion of points exclude it, except in planar scenes, as they may leave the plane.
         """
         if not all(function.is_planar for _, function in self._of_motion):
             return None
@@ -106,7 +106,7 @@ class MultibodySystem:
 
     @cached_property
     def replay(self) -> _core.Replay | None:
-        """Replayed numbers for integrators; None without any."""
+        """Replayed inputs for integrators; None without any."""
         if self.replayed is None:
             return None
         size = len(OF_POINT) if self.plane is None else 3
@@ -119,7 +119,7 @@ class MultibodySystem:
         return _core.Replay(self.replayed.source, zero_order_hold(self.model, self.replayed.commands), at_points)
 
     def multipliers(self, of_core: Array) -> Array:
-        """Return multipliers (T, rows) of the model from those of `integrated`; 0 for omitted or dependent rows."""
+        """Return multipliers (T, rows), N or N·m, of the model from those of `integrated`; 0 for omitted equations."""
         of_rows = of_core if self.plane is None else of_core @ self.plane.spread.T
         return of_rows * self.model.row_signs
 
@@ -133,7 +133,7 @@ class MultibodySystem:
         return self._wrenches.index(self._markers.place(self.model.tree.section(point)))
 
     def forward_model(self) -> _core.ForwardModel:
-        """The model for motions under held inputs, without loads of the scene; rows must follow nothing."""
+        """Return the model for motions under constant inputs, without loads of the scene or targets."""
         return _core.ForwardModel(*self._parts[:-1], self.scene)
 
     def _driven(self, commands: Sequence[Command]) -> Booleans:
@@ -203,7 +203,7 @@ def _shares(component: int, plane: Plane | None) -> list[tuple[int, float]]:
 
 
 def zero_order_hold(model: Model, commands: Sequence[Command]) -> _core.ZeroOrderHold:
-    """Forces of commands that are held, in their order."""
+    """Return the core's forces of `commands`, in this order, which are constant between samples."""
     hold = _core.ZeroOrderHold(np.reshape([c.direction for c in commands], (len(commands), model.tree.n_v)).T)
     for number, command in enumerate(commands):
         if command.frame is None:
@@ -218,9 +218,9 @@ def zero_order_hold(model: Model, commands: Sequence[Command]) -> _core.ZeroOrde
 
 @struct
 class MotorForces:
-    """Motor forces τ (T, k) by joint, N·m or N, on its second side, and modal forces F_p (T, n) by body, of patches.
+    """Motor forces τ (T, k) by joint, N·m or N, on its second side; modal forces F_p (T, n), N/√kg, of patches by body.
 
-    F_p belongs to the modes of the modal body file.
+    F_p are on the modes of the modal body file.
     """
 
     moments: Mapping[str, Array]
@@ -228,7 +228,7 @@ class MotorForces:
 
 
 def driven_system(model: Model) -> MultibodySystem:
-    """The model in the core, with forces along the coordinates of its motors."""
+    """Return the model in the core, with forces along the coordinates of its motors."""
     return MultibodySystem(model, commands=[Command(along) for joint in model.motors for along in model.along(joint)])
 
 
@@ -242,7 +242,7 @@ def driven_mechanism(model: Model, *, has_motors: bool = True) -> _core.SpatialD
 
 
 def fastest_mechanism(model: Model, *, has_motors: bool = True) -> _core.PlanarDriven | _core.SpatialDriven:
-    """Return a mechanism of the core, planar for open chains in a plane if their equations are equal."""
+    """Return the core's mechanism, planar for open chains that move in a plane, where both have the same equations."""
     system = driven_system(model)
     if model.loop_rows.any() or system.plane is None:
         return driven_mechanism(model, has_motors=has_motors)
@@ -252,7 +252,7 @@ def fastest_mechanism(model: Model, *, has_motors: bool = True) -> _core.PlanarD
 def integrated_mechanism(
     system: MultibodySystem, *, has_motors: bool = True
 ) -> _core.PlanarDriven | _core.SpatialDriven:
-    """Return the mechanism as integrated: planar if all motion is in one plane."""
+    """Return the mechanism that integrators use: planar if all motion is in one plane."""
     (core, scene, rows), model = system.integrated, system.model
     is_path = [model.rows[k].is_trajectory for k in rows]
     driven: _core.PlanarDriven | _core.SpatialDriven
@@ -273,14 +273,14 @@ def _add_motors(driven: _core.PlanarDriven | _core.SpatialDriven, model: Model) 
 
 
 def path_forces(model: Model, times: Array, q: Array, multipliers: Array) -> Array:
-    """Generalized forces −C_sᵀλ_s (T, n_v), N, N·m, N/√kg, of path constraints with multipliers λ (T, rows)."""
+    """Return generalized forces −C_sᵀλ_s (T, n_v), N, N·m, N/√kg, of path constraints by multipliers (T, rows), SI."""
     return driven_mechanism(model).path_forces(times.tolist(), q, multipliers * model.row_signs)
 
 
 def frames_in_core(model: Model, q: Array) -> list[tuple[Array, Array]]:
-    """Return axes (3, 3) and origin (3,), m, of all bodies in the core's frames of them, at q (n_q,).
+    """Return axes (3, 3) and origin (3,), m, of each body's frame in the core's frame of this body, at q (n_q,).
 
-    The core has frames where they suit the joints.
+    The core's frames are where they suit the joints.
     """
     places, frames = model.tree.places(q[None]), driven_system(model).core.frames(q, np.zeros(model.tree.n_v))
     own = [places.frame(number) for number in range(len(frames))]
@@ -300,15 +300,15 @@ def path_forces_on_bodies(model: Model, times: Array, q: Array, multipliers: Arr
 
 
 class SplitForces(NamedTuple):
-    """τ (T, k), N·m or N, by joint, EᵀF_p (T, n_v), N/√kg, and λ_c (T, constraint equations of loops), N or N·m."""
+    """Motor torques, modal forces and multipliers of loops that supply wanted generalized forces."""
 
-    moments: dict[str, Array]
-    left: Array
-    loops: Array
+    moments: dict[str, Array]  # τ (T, k), N·m or N, by joint
+    left: Array  # EᵀF_p (T, n_v), N/√kg
+    loops: Array  # λ_c (T, constraint equations of loops), N or N·m
 
 
 def split_forces(model: Model, q: Array, wanted: Array) -> SplitForces:
-    """Solve Gᵀτ + EᵀF_p − C_cᵀλ_c = `wanted` (T, n_v) at q (T, n_q): mbs/core/recursion/inverse/motors.h."""
+    """Solve Gᵀτ + EᵀF_p − C_cᵀλ_c = `wanted` (T, n_v), N, N·m, N/√kg, at q (T, n_q): recursion/inverse/motors.h."""
     tau, left, multipliers = driven_mechanism(model).split(q, wanted)
     return SplitForces(model.by_motor(tau), left, multipliers)
 
@@ -321,9 +321,9 @@ def motor_forces(model: Model, q: Array, wanted: Array) -> MotorForces:
 
 
 class FrameShare(NamedTuple):
-    """Modal forces of a unit torque of a motor that turns frames, beside its torque along the joint.
+    """Modal forces of a unit torque, 1 N·m, of a motor that turns frames, in addition to its torque along the joint.
 
-    `direction` (n_v,), and `slope` (n_v, n_v), its derivative along v: the axis turns with the section.
+    `direction` (n_v,), and `slope` (n_v, n_v), its derivative along v, as the axis turns with the section.
     """
 
     direction: Array
@@ -331,9 +331,10 @@ class FrameShare(NamedTuple):
 
 
 def frame_share(model: Model, joint: str, q: Array) -> FrameShare:
-    """The share −Φ_rᵀ J_l(φ) z of both sections, turned by φ = Φ_r p, for a revolute joint's motor at q (n_q,).
+    """Return modal forces −Φ_rᵀ J_l(φ) z per torque of a revolute joint's motor on both sections at q (n_q,).
 
-    Why: core/recursion/motion/zero_order_hold.h.
+    z is the axis, φ = Φ_r p the rotation of a section and J_l the left Jacobian of rotation vectors; see
+    core/recursion/motion/zero_order_hold.h.
     """
     tree = model.tree
     direction, slope = np.zeros(tree.n_v), np.zeros((tree.n_v, tree.n_v))
@@ -349,7 +350,7 @@ def frame_share(model: Model, joint: str, q: Array) -> FrameShare:
 
 
 def turning_motors(model: Model) -> list[str]:
-    """Joints with one angle, that of sections, whose motors turn frames in place of these."""
+    """Return names of joints with one angle, between sections, whose motors turn the frames of bodies instead."""
     if model.scene.motors != "frame":
         return []
     tree = model.tree

@@ -1,7 +1,7 @@
 """A tree of bodies, and the joints at which its loops are cut.
 
-State q: of each body in the order of the tree the q of its joint, then its p; v likewise, with the joint's freedoms.
-It is the core's. All functions take states (…, n_q) at once; what comes out is in global axes, SI units.
+State q has, for each body in the order of the tree, the q of its joint, then its p; v likewise, with the joint's v.
+It is that of the core. All functions evaluate states (…, n_q) at once; results are in global axes, SI units.
 
 The tree has no coordinate γ of a joint at which a loop is cut, γ̇ = G v: a force f along it, as of friction or a load,
 is Gᵀf. The output of a rotor is a body of the tree without inertia beside the loop: its coordinate is γ by a constraint
@@ -34,9 +34,9 @@ AXES.setflags(write=False)
 
 
 class CompliantGear(NamedTuple):
-    """A compliant gear: `spring`, and damper `damping` c (N·m·s/rad), behind a motor of the tree.
+    """A compliant gear: `spring`, and damper `damping` c (N·m·s/rad or N·s/m), behind a motor of the tree.
 
-    The twist δ is that of `motor`, whose coordinate is θ_m, against `joint`, whose coordinate is `sign` γ: δ = θ_m − γ.
+    Its twist is δ = θ_m − γ with the coordinate θ_m of `motor`, and `sign` γ of `joint`.
     """
 
     motor: Node
@@ -46,15 +46,15 @@ class CompliantGear(NamedTuple):
     damping: float
 
     def twist(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """Twist δ (…,), rad or m, and its rate δ̇ at q (…, n_q), v (…, n_v)."""
+        """Return the twist δ (…,), rad or m, and its rate δ̇, rad/s or m/s, at q (…, n_q), v (…, n_v)."""
         a, b = self.motor, self.joint
         way, rate = q[..., a.q.start] - self.sign * q[..., b.q.start], v[..., a.v.start] - self.sign * v[..., b.v.start]
         return way, rate
 
     def round_off(self, q: Array) -> float:
-        """Round-off of the spring's torque, as that of angles makes it, by its largest one at q (T, n_q).
+        """Return the round-off of the spring's torque by that of angles, relative to the largest torque at q (T, n_q).
 
-        0 where there is no torque but round-off.
+        0 where all torque is round-off.
         """
         angle, twist = (
             float(np.abs(of).max(initial=0.0))
@@ -68,9 +68,9 @@ class CompliantGear(NamedTuple):
 class KinematicTree:
     """Spanning forest of bodies on their joints, SI units; `loops`: the loop-closing joints, in the scene's order.
 
-    `tools` are the points "BODY.POINT" with axes of their own, (3, 3) columns in those of the body. `gears` are between
-    its joints: none where they are taken for rigid (see `gears.with_compliance`).
-    `on_frames` names joints whose angles are those of frames (see `model.with_coordinates_of_frames`).
+    `tools` are points "BODY.POINT" with their own axes (3, 3), columns, in those of the body. `gears` are compliant
+    gears, none where all are rigid (see `gears.with_compliance`). `on_frames` names joints whose angles are between
+    frames (see `build.with_coordinates_of_frames`).
     """
 
     gears: tuple[CompliantGear, ...] = ()
@@ -112,7 +112,10 @@ class KinematicTree:
         self.carried = {node.joint.name: number for number, node in enumerate(nodes)}
 
     def section(self, side: str, triad: Array = AXES, at: Sequence[float] = (0.0, 0.0, 0.0)) -> Section:
-        """Triad of "BODY.POINT", of the frame of "BODY", or of "ground" `at` (m), in its body's axes."""
+        """Return the section "BODY.POINT", the frame of "BODY", or a place `at` (3,), m, on "ground".
+
+        `triad` (3, 3), columns, is in axes of the body or tool.
+        """
         if side == GROUND:
             return Section(-1, "", triad, np.array(at, dtype=float))
         body, _, point = side.partition(".")
@@ -120,14 +123,14 @@ class KinematicTree:
         return Section(self.index[body], point, own, np.zeros(3))
 
     def sides(self, joint: JointRecord) -> tuple[Section, Section]:
-        """The sections that a joint is between, the first and the second."""
+        """Return the sections of the first and the second side of a joint."""
         first, second = zip(joint.between, joint.triads(), strict=True)
         return self.section(*first, joint.at), self.section(*second, joint.at)
 
     def with_outputs(self, outputs: Sequence[tuple[JointRecord, str, Section]]) -> KinematicTree:
-        """Return the tree with a massless body, named by a label, on each one-coordinate joint with a rotor.
+        """Return the tree with the output of a rotor's gear as a massless body for each (joint, name, section).
 
-        They turn or slide on the sections `inner` as the outputs of the rotors' gears do, and stand after all others.
+        It turns or slides on this section as the joint of one coordinate does. Outputs come after all other bodies.
         """
         tree, nodes = copy.copy(self), list(self.nodes)
         for joint, label, inner in outputs:
@@ -141,7 +144,7 @@ class KinematicTree:
         return tree
 
     def with_bodies(self, bodies: Sequence[Body]) -> KinematicTree:
-        """The tree with other bodies of the same names, modes and points, in its order."""
+        """Return the tree with other bodies of the same names, modes and points, in its order."""
         tree = copy.copy(self)
         tree.nodes = tuple(replace(node, body=body) for node, body in zip(self.nodes, bodies, strict=True))
         return tree
@@ -160,7 +163,7 @@ class KinematicTree:
         return is_joint
 
     def at_rest(self, guesses: Mapping[str, Array]) -> Array:
-        """Q (n_q,) of undeformed links, with joint coordinates in the scene's order by name, else 0."""
+        """Return q (n_q,) of undeformed links, with joint coordinates `guesses` by name, rad or m, else 0."""
         q = np.zeros(self.n_q)
         for node in self.nodes:
             numbers = len(node.joint.guess_units or node.joint.units)
@@ -169,11 +172,11 @@ class KinematicTree:
         return q
 
     def places(self, q: Array, v: Array | None = None) -> Places:
-        """Return positions (m) of frames and sections at q (T, n_q), motions (m/s, rad/s) with v (T, n_v) or 0."""
+        """Return positions (m) and velocities (m/s, rad/s) of frames and sections at q (T, n_q), v (T, n_v) or 0."""
         return self._moving.places(q, v)
 
     def integrate(self, q: Array, dv: Array) -> Array:
-        """Q (…, n_q) moved by a small step dv (…, n_v): quaternions along the exponential."""
+        """Return q (…, n_q) moved by a small step dv (…, n_v), SI: quaternions by the exponential map."""
         shape = dv.shape[:-1]
         at, count = np.broadcast_to(q, (*shape, self.n_q)), int(np.prod(shape))
         moved = self._moving.core.moved(at.reshape(count, self.n_q), dv.reshape(count, self.n_v))
@@ -199,22 +202,22 @@ def _node_at(
 class CutCoordinate(NamedTuple):
     """A coordinate of a joint at which a loop is cut, rad or m."""
 
-    joint: JointRecord  # whose it is; of the second of its sides on the first
-    number: int  # of the joint's coordinates
+    joint: JointRecord
+    number: int  # index among the joint's coordinates
     row: ConstraintRow  # measures `row.sign` times the coordinate
-    friction: Friction | None  # along it
-    loads: tuple[TimeFunction, ...]  # given forces of time along it, N·m or N
-    guess: float  # of its first value, as [initial] has it, else 0
+    friction: Friction | None  # along the coordinate
+    loads: tuple[TimeFunction, ...]  # given forces over time along it, N·m or N
+    guess: float  # of its first value, from [initial], else 0
 
     def resistance(self, rate: Array) -> Array:
-        """Friction (T,) at the coordinate's rate, N·m or N."""
+        """Return friction (T,), N·m or N, at the coordinate's rate (T,), rad/s or m/s."""
         return np.zeros_like(rate) if self.friction is None else self.friction.resistance(rate)
 
 
 def with_auxiliary_rotors(tree: KinematicTree) -> tuple[KinematicTree, list[ConstraintRow]]:
-    """The tree with the outputs of rotors in joints at which loops are cut, and the rows by which they turn with these.
+    """Return the tree with outputs of the rotors in cut joints, and the equations by which they move with these joints.
 
-    They are on the first sides of their joints, whose coordinates theirs are.
+    Outputs are on the first sides of their joints, with the same coordinates.
     """
     cut = [joint for joint in tree.loops if getattr(joint, "rotor_inertia", 0.0)]
     rows = [cut_row(tree, joint) for joint in cut]
@@ -235,7 +238,7 @@ def cut_coordinates(scene: MechanismScene, tree: KinematicTree) -> Iterator[CutC
 
 
 def cut_row(tree: KinematicTree, joint: JointRecord, number: int = 0) -> ConstraintRow:
-    """Return the row of a coordinate of a cut joint, times `sign`: of the second side relative to the first."""
+    """Return the equation that measures coordinate `number`, times its `sign`, of a cut joint."""
     along = joint.along[number]
     sides = tree.sides(joint)
     if joint.name in tree.on_frames:
@@ -247,9 +250,9 @@ def cut_row(tree: KinematicTree, joint: JointRecord, number: int = 0) -> Constra
 
 
 def loop_rows(scene: MechanismScene, tree: KinematicTree, joint: JointRecord) -> Iterator[ConstraintRow]:
-    """Yield the rows by which a joint closes a loop, which is cut there.
+    """Yield the equations by which a joint closes a loop, which is cut there.
 
-    Raises `InputError` for a type that cannot, and for a motor without a rotor, or a compliant gear, in it.
+    Raises `InputError` for types that cannot close loops, for a motor without a rotor, and for a compliant gear.
     """
     if key := joint.asks_for_coordinate:
         raise InputError(
@@ -269,12 +272,12 @@ def loop_rows(scene: MechanismScene, tree: KinematicTree, joint: JointRecord) ->
 
 
 class CutMotion(NamedTuple):
-    """Motion of a coordinate along a cut joint; SI units.
+    """Motion of a coordinate of a cut joint.
 
     Attributes:
-        coordinate: (T,), full turns counted.
-        rate: (T,).
-        is_counted: whether the times are close enough together to count its turns.
+        coordinate: (T,) rad or m, with full turns.
+        rate: (T,) rad/s or m/s.
+        is_counted: whether times are close enough together to count turns.
     """
 
     coordinate: Array
@@ -291,13 +294,13 @@ class AlongCut:
         self._kinematics = Kinematics(tree.nodes, rows=[one.row for one in cut]) if cut else None
 
     def measured(self, q: Array) -> tuple[Array, Array]:
-        """γ (T, cut), rad or m, at q (T, n_q), angles within ±π, and G = ∂γ̇/∂v (T, cut, n_v)."""
+        """Return γ (T, cut), rad or m, at q (T, n_q), angles within ±π, and G = ∂γ̇/∂v (T, cut, n_v)."""
         if self._kinematics is None:
             return np.zeros((len(q), 0)), np.zeros((len(q), 0, self._n_v))
         return self._kinematics.values(q, np.zeros(len(q)))
 
     def resistance(self, q: Array, v: Array) -> Array:
-        """Generalized forces (T, n_v) by which friction resists at q (T, n_q) and v (T, n_v)."""
+        """Return generalized forces (T, n_v), N, N·m, N/√kg, by which friction resists at q (T, n_q), v (T, n_v)."""
         force = np.zeros_like(v)
         gradients = self.measured(q)[1] if self._rough else force
         for k in self._rough:
@@ -306,7 +309,7 @@ class AlongCut:
         return force
 
     def damping(self, q: Array) -> Array:
-        """D (n_v, n_v), N·m·s/rad or N·s/m, of viscous friction at q (n_q,)."""
+        """Return the damping matrix (n_v, n_v), N·m·s/rad or N·s/m, of viscous friction at q (n_q,)."""
         D = np.zeros((self._n_v, self._n_v))
         gradients = self.measured(q[None])[1][0] if self._rough else D
         for k in self._rough:

@@ -25,12 +25,12 @@ DEPENDENT = 1e-8  # static shapes below this fraction of the first one, in energ
 
 
 def with_fewer_modes(body: Body, lowest: int, loaded: Sequence[str]) -> Body:
-    """The body with its `lowest` modes and, for each load at a point of `loaded`, the static response of the others.
+    """Return the body with its `lowest` modes and the static response of others to each load at points `loaded`.
 
-    A unit load (modal forces Bᵀ) bends the discarded modes d by Ω_d⁻² B_dᵀ. These shapes, made orthonormal in mass and
-    uncoupled, are further modes: the flexibility B K⁻¹ Bᵀ stays exact. The body comes back where nothing is saved.
-    Attachment modes of the file are no modes to be kept: what the loads need of them is in the static shapes. These are
-    found apart for modes that no load couples: they keep to the plane of bending, or to torsion.
+    A unit load (modal forces Bᵀ) bends the discarded modes d by Ω_d⁻² B_dᵀ. These shapes, orthonormal in mass and
+    uncoupled, are further modes: the flexibility B K⁻¹ Bᵀ stays exact. A body that would have no fewer coordinates is
+    unchanged. Attachment modes of the file are not kept, but contribute to the static shapes. Modes that no load
+    couples have separate shapes, which stay in a plane of bending, or in torsion.
     """
     lowest = min(lowest, body.n_eigenmodes)
     kept = np.sort(np.argsort(body.stiffness[: body.n_eigenmodes], kind="stable")[:lowest])
@@ -68,15 +68,15 @@ def modes_kept(body: Body) -> str:
 
 
 def loaded_points(scene: MechanismKeys, body: str) -> list[str]:
-    """Points of a body at which joints, trajectories and loads of the scene act."""
+    """Return names of points of a body at which joints, trajectories and loads of the scene act."""
     loaded = [reference.body_and_point for reference in scene.references() if reference.loaded]
     return list(dict.fromkeys(part[1] for part in loaded if part is not None and part[0] == body))
 
 
 def interface_loads(body: Body, loaded: Sequence[str]) -> Array:
-    """Bᵀ (n, loads): modal forces of forces and moments along all axes at each point, scaled to size 1.
+    """Return Bᵀ (n, loads), without unit: modal forces by a load along and about each axis at points, scaled to size 1.
 
-    Left out are loads under which nothing moves: forces on a support, along a link without axial modes.
+    Loads under which nothing moves are left out: forces on a support, or along a link without axial modes.
     """
     rows = [np.zeros((0, body.n_modes))]
     for label, at in body.points.items():
