@@ -1,1 +1,1 @@
-"""What the records of a scene are made of: names, references to points, functions of time."""
+"""Fields of the records of a scene: names, references to points, functions of time."""

@@ -1,4 +1,4 @@
-"""What the records of a scene file are made of: names, points, references, expressions in t, checks of keys."""
+"""Types of fields in a scene file: names, points, references, expressions in t; checks of keys."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -35,10 +35,9 @@ METHOD = "integrator"
 class Steps:
     """Steps of an analysis in the results file at `path`: `method`, and times (N,), s, at which steps ended.
 
-    Runs that choose their own steps differ by as much as these err, however small a change of the scene. With the same
-    steps the discrete motion is a smooth function of every number in the scene, and differences of runs have no noise
-    but round-off: internal numerical differentiation (H. G. Bock, Springer Series in Chemical Physics 18, 1981, p.
-    102).
+    With the same steps the discrete motion is a smooth function of every number in the scene, and differences of runs
+    have no noise but round-off: internal numerical differentiation (H. G. Bock, Springer Series in Chemical Physics
+    18, 1981, p. 102).
     """
 
     path: Path
@@ -47,7 +46,7 @@ class Steps:
 
 
 def load_steps(path: Path, analysis: str) -> Steps:
-    """The steps of the analysis of that name in a results file. Raises `InputError` where it has none."""
+    """Read the time steps of the analysis of that name from a results file. Raises `InputError` where it has none."""
     from ...common.hdf5 import numbers, open_checked  # few scenes have steps, and h5py takes longer than reading one
 
     try:
@@ -147,12 +146,12 @@ def _not_empty(entries: tuple[T, ...]) -> tuple[T, ...]:
 
 
 def given_in(record: Record, keys: Iterable[str]) -> dict[str, Any]:
-    """The values of those `keys` that are set."""
+    """Return the values of those `keys` of a record that are set."""
     return {key: value for key in keys if (value := getattr(record, key)) is not None}
 
 
 def one_of(record: Record, keys: tuple[str, ...]) -> str:
-    """The one key of `keys` that is set. Raises `ValueError` when there is none or more than one."""
+    """Return the one key of `keys` that is set. Raises `ValueError` when there is none or more than one."""
     given = [*given_in(record, keys)]
     if len(given) != 1:
         raise ValueError(f"expected exactly one of the keys {quoted(keys)}, found {quoted(given)}")
@@ -160,7 +159,7 @@ def one_of(record: Record, keys: tuple[str, ...]) -> str:
 
 
 def only(record: Record, subject: str, allowed: tuple[str, ...], optional: tuple[str, ...]) -> list[str]:
-    """Return the `optional` keys that are set. Raises `ValueError` unless all are `allowed` and one is given."""
+    """Return the `optional` keys that are set. Raises `ValueError` for none, or some not `allowed` with `subject`."""
     given = [*given_in(record, optional)]
     if not given or not set(given) <= set(allowed):
         raise ValueError(f'expected the keys {quoted(allowed)} with "{subject}", found {quoted(given)}')
@@ -202,14 +201,14 @@ class Reference:
 
 
 def loaded_reference(key: str, side: str | None) -> list[Reference]:
-    """The reference to a point (or a body's frame) where forces act; none to the ground, or where nothing is given."""
+    """Return the reference to a point (or body frame) where forces act; empty for the ground, or without a `side`."""
     return [] if side is None or side == GROUND else [Reference(key, side, loaded=True)]
 
 
 class Referring(Record):
     """Base of records that name bodies, points, joints or patches of their scene."""
 
-    refers_to: ClassVar[tuple[tuple[str, Kind | Literal["loaded"]], ...]] = ()  # keys, and what one or all values name
+    refers_to: ClassVar[tuple[tuple[str, Kind | Literal["loaded"]], ...]] = ()  # keys, each with what its values name
 
     def references(self) -> Iterator[Reference]:
         """Yield all references of the record."""
@@ -220,11 +219,11 @@ class Referring(Record):
 
 
 def body_of(side: str) -> str:
-    """The body of "BODY.POINT" or "BODY"; the ground's name for the ground."""
+    """Return the body of "BODY.POINT" or "BODY"; "ground" for the ground."""
     return side.partition(".")[0]
 
 
 def under(label: str, references: Iterable[Reference]) -> Iterator[Reference]:
-    """The references of a record that messages call `label`, with their full keys."""
+    """Yield references of a record that messages call `label`, each with its full key."""
     for reference in references:
         yield replace(reference, key=f"{label}: {reference.key}" if reference.key else label)

@@ -16,10 +16,10 @@ from .spelling import SPATIAL
 
 
 def user_function(function: object) -> TimeFunction:
-    """A function of t (s) from Python: it returns (value, rate, acceleration); the value is enough for loads.
+    """Make a function of t (s) from one in Python that returns (value, rate, acceleration); loads need the value alone.
 
-    One that has been compiled (`numba.cfunc` and its like, with an `address`) writes the three numbers to its second
-    argument, `void(double t, double *out)`, and runs at the speed of the core. Raises `ValueError` for anything else.
+    A compiled one (`numba.cfunc` and its like, with an `address`) writes the three numbers to its second argument,
+    `void(double t, double *out)`, and runs at the speed of the core. Raises `ValueError` for anything else.
     """
     address = getattr(function, "address", None)
     if isinstance(address, int):
@@ -41,7 +41,7 @@ def user_function(function: object) -> TimeFunction:
 
 
 def called(function: Callable[..., object], t: float, *arguments: object) -> Array:
-    """Return the numbers of a user's function; a note with its name and the time t is added to its errors.
+    """Return the numbers (any,), of any unit, of a user's function; its errors get a note with its name and t (s).
 
     Raises `InputError` where it returns something else than numbers.
     """
@@ -61,10 +61,10 @@ def _name_of(function: object) -> str:
 
 
 def check_domain(function: TimeFunction, times: Array, describe: str, derivatives: int = 2) -> None:
-    """Make sure `function` and its first `derivatives` time derivatives exist at all `times` (T,), in s.
+    """Raise `InputError` unless `function` and its first `derivatives` time derivatives exist at all `times` (T,), s.
 
-    Raises `InputError`, starting with `describe` (file and key), at the first time where one is missing or infinite: a
-    domain error, an overflow, or a time that the waypoints do not cover.
+    The message starts with `describe` (file and key) and has the first time where one is missing or infinite: a domain
+    error, an overflow, or a time that the waypoints do not cover.
     """
     samples = function.sample(np.ascontiguousarray(times, dtype=np.float64))[: derivatives + 1]
     bad = np.flatnonzero(~np.isfinite(samples).all(axis=0))
@@ -95,9 +95,9 @@ GOLDEN = 0.6180339887498949  # its multiples fall on no grid, so on no instant a
 def check_derivatives(function: TimeFunction, end: float, describe: str) -> None:
     """Raise `InputError`, starting with `describe`, where rate or acceleration contradict differences before `end` (s).
 
-    Differences of the value, and of the rate, are made with several steps h. One knows the derivative where that with
-    h/2 agrees. Beside a jump of the acceleration, where values are rounded, or vibrate faster than a step, none does or
-    only those with a shorter step; the function is wrong where all that know contradict it.
+    Differences of the value, and of the rate, are made with several steps h, and count where those with h/2 agree.
+    Few or none do beside a jump of the acceleration, where values are rounded, or vibrate faster than a step. The
+    function is wrong where all that count contradict it.
     """
     times = end * (0.02 + 0.96 * ((GOLDEN * np.arange(1, INSTANTS + 1)) % 1.0))
     given = function.sample(times)
@@ -133,12 +133,12 @@ def _judged(once: Array, twice: Array, given: Array, round_off: float) -> tuple[
 
 
 def state_function(function: object, *, is_planar: bool = True) -> StateFunction:
-    """A force (N, global axes) and moment (N·m) on a point: f(t, position, velocity) → force, or force and moment.
+    """Make a force (N, global axes) and moment (N·m) on a point from f(t, position, velocity) in s, m, m/s.
 
     Position and velocity have the shape (2,) in the plane, where f returns (x, y) or (x, y, moment); in space (3,), and
-    f returns (x, y, z) or (x, y, z, mx, my, mz). One that has been compiled (`numba.cfunc` and its like, with an
-    `address`) is `void(double t, const double *position, const double *rates, double *force)`, runs at the speed of the
-    core, and has the numbers of mbs/core/recursion/constrained_aba/point_force.h. Raises `ValueError` for all else.
+    f returns (x, y, z) or (x, y, z, mx, my, mz). A compiled function (`numba.cfunc` and its like, with an `address`) is
+    `void(double t, const double *position, const double *rates, double *force)`, runs at the speed of the core, and has
+    the numbers of mbs/core/recursion/constrained_aba/point_force.h. Raises `ValueError` for all else.
     """
     address = getattr(function, "address", None)
     if isinstance(address, int):

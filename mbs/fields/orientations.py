@@ -22,12 +22,12 @@ WIDEST = 2.8  # rad from the middle of all orientations of a table: a rotation v
 
 @struct
 class OrientationLaw:
-    """A triad A(t), or its third axis alone ("direction")."""
+    """Prescribed triad A(t) in global axes, or its third axis alone ("direction")."""
 
     # what `functions` are: a rotation vector ψ, A = exp(ψ~) exp(reference~); roll, pitch and yaw about fixed axes; or
     # components of a direction of any length
     kind: Literal["rotation_vector", "rpy", "direction"]
-    functions: tuple[TimeFunction, ...]  # three functions of time, rad
+    functions: tuple[TimeFunction, ...]  # three functions of time, rad (direction: without unit)
     reference: Reference = (0.0, 0.0, 0.0)  # rotation vector (3,), rad
 
     @cached_property
@@ -37,12 +37,12 @@ class OrientationLaw:
         return _core.TurningLaw(kind, list(self.functions), reference)
 
     def sample(self, times: Array) -> Array:
-        """Return triads A (T, 3, 3), axes in columns, at `times` (T,), s; of a direction by z's smallest turn."""
+        """Return triads A (T, 3, 3), columns, at `times` (T,), s; for a direction the smallest turn of z onto it."""
         return self.in_core.sample(times)[0].reshape(-1, 3, 3)
 
 
 def orientation_of(table: Waypoints) -> tuple[Array, Reference]:
-    """Convert columns qw, qx, qy, qz of a table to rotation vectors (T, 3), rad, about the middle of all, and it.
+    """Return rotation vectors (T, 3), rad, of columns qw, qx, qy, qz from their mean orientation, and that of the mean.
 
     Splines of log(A A_refᵀ) are smooth; piecewise interpolation of quaternions would jump in angular velocity. Raises
     `InputError` for a row that is no unit quaternion, and for orientations too far apart for one rotation vector.
@@ -56,10 +56,10 @@ def orientation_of(table: Waypoints) -> tuple[Array, Reference]:
 
 
 def about_their_middle(A: Array, each: str) -> tuple[Array, Reference]:
-    """Return rotation vectors (T, 3), rad, of triads A (T, 3, 3) against their middle, and its own.
+    """Return rotation vectors (T, 3), rad, of triads A (T, 3, 3) from their mean orientation, and that of the mean.
 
-    A straight line between two of them is a turn about a fixed axis where these are all there are.
-    Raises `InputError` where orientations are too far apart, which calls them `each` and a number.
+    With two triads the straight line between their vectors is a rotation about a fixed axis. Raises `InputError`, which
+    calls a triad `each` and a number, where orientations are too far apart.
     """
     U, _, V = np.linalg.svd(A.mean(axis=0))  # the rotation nearest to all is the polar factor of their mean
     middle = of_quaternion(quaternions(U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V))

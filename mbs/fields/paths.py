@@ -1,4 +1,4 @@
-"""Motions made of polynomials: laws from rest to rest, paths of them through places, holds between, input shapers.
+"""Motions made of polynomials: laws from rest to rest, paths through waypoints with holds, input shapers.
 
 Two families of laws s(t) from 0 to 1. A polynomial whose first m derivatives vanish at both ends; and a step that is
 averaged over times T₁ ≥ T₂ ≥ … one after the other, which makes a trapezoid of speeds of two of them, an S-curve with
@@ -60,7 +60,7 @@ class Piecewise:
         return shifted(self.coefficients[-1], self.end - self.breaks[-2])[-1]
 
     def sample(self, times: Array, derivative: int = 0) -> Array:
-        """Return a derivative (T, n), m or rad per sᵏ, at `times` (T,), s; at jumps that of the following piece."""
+        """Return derivative no. k (T, n), m or rad per sᵏ, at `times` (T,), s; at jumps that of the following piece."""
         t = np.clip(times, self.begin, self.end)
         piece = np.clip(np.searchsorted(self.breaks, t, side="right") - 1, 0, len(self.coefficients) - 1)
         powers = range(self.coefficients.shape[1] - 1, derivative - 1, -1)
@@ -75,12 +75,12 @@ class Piecewise:
         return [TimeFunction.polynomial(self.breaks, one) for one in each]
 
     def functions(self) -> list[TimeFunction]:
-        """The same, held before and after the motion."""
+        """One function of time for each component, constant before and after the motion."""
         return [function.held(self.begin, self.end) for function in self.polynomials()]
 
 
 def shifted(coefficients: Array, s: Array | float) -> Array:
-    """Return polynomials (…, order, n), highest power first, in powers of x − s, s (…) (Horner's scheme)."""
+    """Return polynomials in x (…, order, n), any unit, highest power first, in powers of x − s, s (…) (Horner)."""
     moved, s = coefficients.copy(), np.asarray(s)[..., None]
     for last in range(moved.shape[-2], 1, -1):
         for k in range(1, last):
@@ -89,7 +89,7 @@ def shifted(coefficients: Array, s: Array | float) -> Array:
 
 
 def superposed(motions: Sequence[Piecewise], weights: Sequence[float] | None = None) -> Piecewise:
-    """Sum of weight · motion (weights 1 where not given); each motion rests before its begin and after its end."""
+    """Return Σ weight · motion (weights 1 where not given); each motion rests before its begin and after its end."""
     breaks = merged(np.concatenate([motion.breaks for motion in motions]))
     middles = 0.5 * (breaks[1:] + breaks[:-1])
     order = max(motion.coefficients.shape[1] for motion in motions)
@@ -108,7 +108,7 @@ def superposed(motions: Sequence[Piecewise], weights: Sequence[float] | None = N
 
 
 def merged(instants: Array) -> Array:
-    """Return the instants, s, in ascending order; those that differ by round-off are one."""
+    """Return `instants` (any,), s, in ascending order; those that differ by round-off are one."""
     every = np.unique(instants)
     return every[np.append(True, np.diff(every) > SAME_TIME * np.ptp(every))]
 
@@ -130,7 +130,7 @@ class PathLimits(NamedTuple):
 
 
 def law_in(duration: float, profile: Profile, smoothness: int) -> Piecewise:
-    """The law that takes `duration` (s), of one component."""
+    """Return the law of motion s(t) from 0 to 1 in `duration` (s); `smoothness`: number of continuous derivatives."""
     if profile == "rest-to-rest":
         return polynomial_law(smoothness).moved(duration)
     times = HALF ** np.arange(smoothness + 1)
@@ -138,9 +138,9 @@ def law_in(duration: float, profile: Profile, smoothness: int) -> Piecewise:
 
 
 def law_within(distance: float, limits: PathLimits, profile: Profile, smoothness: int) -> Piecewise:
-    """The fastest law over `distance` (m or rad) that keeps the `limits`, of one component.
+    """Return the fastest law s(t) from 0 to 1 with which a motion over `distance` (m or rad) satisfies `limits`.
 
-    Raises `ValueError` where parts of it are too short beside others.
+    `smoothness`: number of continuous derivatives. Raises `ValueError` where parts of it are too short beside others.
     """
     if profile == "rest-to-rest":
         peaks = [distance * law_peak(smoothness, order) for order in (1, 2, 3)]
@@ -163,7 +163,10 @@ def check_durations(durations: Sequence[float], total: float) -> None:
 
 
 def averaging_times(distance: float, limits: PathLimits) -> tuple[float, float, float]:
-    """T₁ ≥ T₂ + T₃, T₂ ≥ T₃ (s) of the fastest motion over `distance` within the limits; T₃ = 0 without one of jerk."""
+    """Return averaging times T₁ ≥ T₂ + T₃, T₂ ≥ T₃ (s) of the fastest motion over `distance` (m, rad) within `limits`.
+
+    T₃ = 0 without a limit of jerk.
+    """
     h, (v, a, j) = distance, limits
     T_3 = min(a / j, sqrt(v / j), (h / (2 * j)) ** (1 / 3)) if j < inf else 0.0
     if T_3:
@@ -173,7 +176,7 @@ def averaging_times(distance: float, limits: PathLimits) -> tuple[float, float, 
 
 
 def averaged_step(times: Array) -> Piecewise:
-    """The unit step at 0, averaged over each of the `times` (m + 1,), s: m continuous derivatives.
+    """Return the unit step at 0, averaged over each of the `times` (m + 1,), s: a law with m continuous derivatives.
 
     The highest derivative is constant between the sums of some of the times; the others follow by integration.
     """
@@ -195,16 +198,16 @@ def averaged_step(times: Array) -> Piecewise:
 
 
 def polynomial_law(smoothness: int) -> Piecewise:
-    """∝ ∫ t^m (1 − t)^m dt on [0, 1] with m = `smoothness`: as many derivatives vanish at both ends.
+    """Return s(t) ∝ ∫ t^m (1 − t)^m dt on [0, 1], m = `smoothness`: as many derivatives vanish at both ends.
 
-    In two pieces: at the end of one, round-off would be that of its large coefficients.
+    It has two pieces, as the large coefficients of one would make round-off at its end.
     """
     whole = _polynomial(smoothness)[:, None]
     return Piecewise(np.array([0.0, 0.5, 1.0]), np.array([whole, shifted(whole, 0.5)]))
 
 
 def law_peak(smoothness: int, order: int) -> float:
-    """Largest size of a derivative of `polynomial_law` on [0, 1]."""
+    """Return the largest size of the derivative of this `order` of `polynomial_law` on [0, 1]."""
     derivative = np.polyder(_polynomial(smoothness), order)
     turns = np.roots(np.polyder(derivative))
     inside = turns.real[(np.abs(turns.imag) < 1e-9) & (turns.real > 0.0) & (turns.real < 1.0)]
@@ -222,7 +225,7 @@ SAMPLES = 64  # of each polynomial, to find where a rounded path is fastest
 
 @struct
 class Legs:
-    """A path through `places` (k + 1, n), m or rad, from the first, where it is until `start` (s)."""
+    """A path of k legs through `places` (k + 1, n), m or rad; it rests at the first until `start` (s)."""
 
     places: Array
     start: float
@@ -230,8 +233,8 @@ class Legs:
     profile: Profile
     smoothness: int
     limits: PathLimits  # of the speed along the path and its derivatives
-    durations: tuple[float, ...] | None  # (k,) s of each leg; None: as long as the limits ask for
-    holds: tuple[float, ...]  # (k − 1,) s at the places between
+    durations: tuple[float, ...] | None  # (k,) s of each leg; None: the shortest within the limits
+    holds: tuple[float, ...]  # (k − 1,) s, rests at the places between
     # share of the shorter of two legs for which they overlap where there is no hold: the path then passes the place
     # between them within the triangle of the three, without a stop
     blend: float = 0.0
@@ -239,7 +242,7 @@ class Legs:
 
 
 def path_of(legs: Legs) -> Piecewise:
-    """Return the motion; where legs overlap, all are slowed down equally until the limits hold."""
+    """Return the motion along `legs`; where these overlap, all are slowed down equally to stay within the limits."""
     motion = _joined(legs)
     if not legs.blend or legs.durations is not None:
         return motion
@@ -292,10 +295,10 @@ class Impulse(NamedTuple):
 def impulses(kind: Kind, frequency: float, damping_ratio: float) -> list[Impulse]:
     """Return the impulses of a shaper for vibrations of one undamped `frequency`, Hz.
 
-    "zv" leaves none at that frequency (Singer and Seering 1990, J. Dyn. Syst. Meas. Control 112); "zvd" none there, and
-    little about it (the derivative with respect to frequency is zero, too); "ei" 5 % there, and at most 5 % over a
-    wider range (Singhose, Seering and Singer 1994, J. Mech. Des. 116). Shares fall with K = exp(−ζπ/√(1 − ζ²)), which
-    half a period leaves of a vibration.
+    "zv" leaves no vibration of that frequency (Singer and Seering 1990, J. Dyn. Syst. Meas. Control 112); "zvd" none,
+    and little nearby (the derivative with respect to frequency is zero, too); "ei" 5 %, and at most 5 % over a wider
+    range (Singhose, Seering and Singer 1994, J. Mech. Des. 116). Shares fall with K = exp(−ζπ/√(1 − ζ²)), by which half
+    a period damps a vibration.
     """
     damped = sqrt(1.0 - damping_ratio**2)
     half, K, V = 0.5 / (frequency * damped), exp(-damping_ratio * pi / damped), RESIDUAL
@@ -305,5 +308,5 @@ def impulses(kind: Kind, frequency: float, damping_ratio: float) -> list[Impulse
 
 
 def shaped(motion: Piecewise, sequence: list[Impulse]) -> Piecewise:
-    """The motion, shaped by one sequence of impulses: as much longer as its last delay."""
+    """Return the motion shaped by one `sequence` of impulses; it is longer by the last delay."""
     return superposed([motion.moved(delay=impulse.delay) for impulse in sequence], [i.share for i in sequence])

@@ -50,9 +50,9 @@ JUMP, SUDDEN, FAST, UNLIKE = 0.02, 2000.0, 300.0, 30.0  # rad or m, beside the l
 
 @dataclass(frozen=True)
 class Waypoints:
-    """The `columns` of a waypoint table after t, their values (T, columns) and times (T,), s, strictly increasing.
+    """Names of the columns of a table after t, values (T, columns), m, rad or quaternions, increasing times (T,), s.
 
-    `remarks` say what was taken for what in it, a line each.
+    `remarks` say how odd entries were understood, a line each.
     """
 
     columns: tuple[str, ...]
@@ -61,7 +61,7 @@ class Waypoints:
     remarks: tuple[str, ...] = ()
 
     def of_joint(self, joint: str) -> "Waypoints":
-        """The column of a joint, as "value": see `OF_A_JOINT`. The whole table where it has none.
+        """Return the column of a joint as "value"; the whole table if no column has one of its names (`OF_A_JOINT`).
 
         Raises `ValueError` where two topics have the joint.
         """
@@ -70,10 +70,10 @@ class Waypoints:
 
     @cached_property
     def spline(self) -> Piecewise:
-        """The quintic spline (four continuous derivatives) through the rows, from rest to rest.
+        """Quintic spline (four continuous derivatives) through the rows, from rest to rest.
 
-        Rows that follow each other with the same values are a hold: the spline comes to rest there, and begins anew
-        after it. Velocity and acceleration are zero at holds and at both ends.
+        Successive rows with the same values are a hold, at which one spline ends and another begins. Velocity and
+        acceleration are zero at holds and at both ends.
         """
         begins, ends = self._ways
         if not len(begins):
@@ -92,9 +92,9 @@ class Waypoints:
 
     @property
     def abrupt_hold(self) -> str:
-        """Remark on a hold that the record does not approach smoothly: rows turn there, or have too few digits.
+        """Remark on a hold that the rows do not approach smoothly, as they turn there or have too few digits; else "".
 
-        By accelerations of the spline in the two intervals before and after it, next to those of the rows.
+        Accelerations of the spline in the two intervals before and after it are compared with those of the rows.
         """
         begins, ends = self._ways
         if len(self.times) < MANY or len(begins) < 2 or (ends - begins).max() < SAMPLES:
@@ -118,9 +118,9 @@ class Waypoints:
 
 @dataclass(frozen=True)
 class Recorded:
-    """A table as a program wrote it: times (T,), s, in any order, and values (T, columns).
+    """A table as a program wrote it: times (T,), s, in any order, values (T, columns), m, rad or quaternions.
 
-    `rates` (T, columns) where the program wrote them, too. `place` of a row is where messages say that it is.
+    `rates` (T, columns), per s, if the program wrote them, too. `place(row)` is where messages say that a row is.
     """
 
     columns: Sequence[str]
@@ -131,7 +131,7 @@ class Recorded:
     rates: Array | None = None
 
     def waypoints(self) -> Waypoints:
-        """Return the rows as waypoints, those that repeat the one before once, with remarks on what is odd.
+        """Return the rows as waypoints with remarks on odd entries; a row that repeats the one before is left out.
 
         Raises `InputError` for times that do not increase, and fewer than two rows.
         """
@@ -154,7 +154,7 @@ class Recorded:
 
 
 def column_of(columns: Sequence[str], joint: str) -> int | None:
-    """Return the column of a joint (see `OF_A_JOINT`). Raises `ValueError` if two topics contain it."""
+    """Return the index of a joint's column or None (see `OF_A_JOINT`). Raises `ValueError` if two topics have one."""
     for pattern in OF_A_JOINT:
         name = pattern.format(joint)
         ends = (f"/{name}",) if name != pattern else ()
@@ -283,7 +283,7 @@ def _accelerations(times: Array, values: Array) -> Array:
 
 
 def difference_quotients(times: Array, values: Array) -> tuple[Array, Array]:
-    """Return midpoints (T − 1,) of `times` (T,), s, and mean rates (T − 1, columns), per s, of `values`."""
+    """Return midpoints (T − 1,) of `times` (T,), s, and mean rates (T − 1, n), per s, of `values` (T, n), any unit."""
     return (times[1:] + times[:-1]) / 2, np.diff(values, axis=0) / np.diff(times)[:, None]
 
 
@@ -308,7 +308,7 @@ def _read_table(path: Path) -> tuple[list[str], Array, Indices]:
 
 
 def numbers_of(path: Path, line: int, row: list[str], count: int) -> list[float]:
-    """Return the `count` numbers of a row of `path`. Raises `InputError` if there are others or more."""
+    """Return the `count` numbers of a row in the file `path`. Raises `InputError` for text, or another count."""
     try:
         numbers = [float(cell) for cell in row]
     except ValueError:
@@ -336,7 +336,10 @@ def interpolated(nodes: Array, values: Array, degree: int = 5, at_rest: bool = T
 
 
 def spline(nodes: Array, values: Array, degree: int = 5, at_rest: bool = False) -> list[TimeFunction]:
-    """Functions of time by columns of `values` (N, columns) at `nodes` (N,), s, `interpolated`; constants if N is 1."""
+    """Return a function of time for each column of `values` (N, columns), of any unit, at `nodes` (N,), s.
+
+    They are `interpolated`, or constants if N is 1.
+    """
     if len(nodes) == 1:
         return [TimeFunction.constant(value) for value in values[0]]
     return interpolated(nodes, values, degree, at_rest).polynomials()

@@ -1,4 +1,4 @@
-"""What all types of joints have in common: two triads, and how the scene counts the coordinates between them. SI units.
+"""Base of all joints: two triads, and the coordinates between them as the scene has them. SI units.
 
 Triads coincide where the coordinates are zero. Motion is along and about z, of universal joints about x of the inner
 triad and y of the outer one. `q` (…, q_count) and `v` (…, freedoms) are the core's (mbs/core/recursion/joint): of
@@ -59,10 +59,10 @@ def stiffer(stiffness: float | StiffnessSteps, factor: float) -> float | Stiffne
 
 @struct
 class TwistSpring:
-    """Torque of a twist, odd and piecewise linear."""
+    """Torque of a twist, odd and piecewise linear; in sliding joints force, N, and displacement, m."""
 
-    slopes: tuple[float, ...]  # N·m/rad, from no twist on; one of a linear spring
-    knots: tuple[float, ...] = ()  # rad, the twists from which on the next slope counts
+    slopes: tuple[float, ...]  # N·m/rad, of intervals of the twist from 0 on; one of a linear spring
+    knots: tuple[float, ...] = ()  # rad, twists from which on the next slope counts
 
     @classmethod
     def of(cls, stiffness: float | StiffnessSteps) -> "TwistSpring":
@@ -100,7 +100,7 @@ def _piecewise(x: Array, slopes: tuple[float, ...], knots: tuple[float, ...]) ->
 
 
 class MotorLimits(NamedTuple):
-    """Largest moment (N·m), speed (rad/s) and power (W) at the joint, infinite without a limit; N, m/s of a force."""
+    """Limits of torque (N·m), speed (rad/s) and power (W) of a motor at the joint; sliding: N, m/s, W."""
 
     moment: float = np.inf
     speed: float = np.inf
@@ -109,11 +109,11 @@ class MotorLimits(NamedTuple):
 
 @struct
 class Friction:
-    """−(c γ̇ + τ_c tanh(γ̇/γ̇_s)) on the coordinate γ of a joint: `viscous` c (N·m·s), `coulomb` τ_c (N·m), γ̇_s."""
+    """Friction −(c γ̇ + τ_c tanh(γ̇/γ̇_s)) along the coordinate γ of a joint."""
 
-    viscous: float
-    coulomb: float
-    speed: float
+    viscous: float  # c, N·m·s/rad or N·s/m
+    coulomb: float  # τ_c, N·m or N
+    speed: float  # γ̇_s, rad/s or m/s
 
     def resistance(self, rate: Array) -> Array:
         """Return c γ̇ + τ_c tanh(γ̇/γ̇_s), N·m or N, at rates γ̇ (…,), rad/s or m/s."""
@@ -131,7 +131,7 @@ Angles = tuple[Quantity, Quantity, Quantity]
 class LoopEquation(NamedTuple):
     """One equation of a loop-closing joint, between axes 0, 1, 2 of its inner triad (`f`) and outer triad (`g`).
 
-    "point": three components of the displacement; "slide": that along f; "dot": f and g are perpendicular.
+    "point": no displacement (three equations); "slide": none along f; "dot": f and g are perpendicular.
     """
 
     kind: Literal["point", "slide", "dot"]
@@ -140,9 +140,9 @@ class LoopEquation(NamedTuple):
 
 
 class Along(NamedTuple):
-    """A coordinate of a joint where it closes a loop; axes of the inner triad, or of the outer one if `of_outer`.
+    """A coordinate of a joint that closes a loop; axes 0, 1, 2 of the inner triad, or of the outer one if `of_outer`.
 
-    "slide": the way along f; "turn": the angle about f by which the outer triad's axis g has left the inner one's.
+    "slide": displacement along f, m; "turn": angle, rad, about f between the axes g of both triads.
     """
 
     kind: Literal["slide", "turn"]
@@ -174,15 +174,15 @@ class JointRecord(Record):
     (or such as "90*deg")."""
 
     units: ClassVar[tuple[str, ...]] = ()  # of its coordinates, "rad" or "m"
-    guess_units: ClassVar[tuple[str, ...]] = ()  # of the numbers by which [initial] gives its place, where those differ
-    axes: ClassVar[tuple[int, ...]] = ()  # along (0, 1, 2) and about (5) which q moves it, in its order
+    guess_units: ClassVar[tuple[str, ...]] = ()  # of its numbers in [initial], where these are no coordinates
+    axes: ClassVar[tuple[int, ...]] = ()  # of each entry of q: along x, y, z (0, 1, 2) or about z (5)
     q_count: ClassVar[int] = 0
     freedoms: ClassVar[int] = 0
     loop_equations: ClassVar[tuple[LoopEquation, ...] | None] = None  # None where it cannot close a loop
-    along: ClassVar[tuple[Along, ...]] = ()  # its coordinates where it does, in the scene's order
-    exchanged: ClassVar[Array] = np.eye(3)  # its axes on exchanged sides, columns, in those before
+    along: ClassVar[tuple[Along, ...]] = ()  # its coordinates where it closes one, in the scene's order
+    exchanged: ClassVar[Array] = np.eye(3)  # axes of the joint with exchanged sides, columns, in its axes
     locates: ClassVar[bool] = True
-    """Whether it fixes the place of one body on the other; the initial guess goes along such joints first."""
+    """Whether it determines where one body is on the other; the initial guess follows such joints first."""
 
     @model_validator(mode="after")
     def _fits_two_bodies(self) -> Self:
@@ -208,7 +208,7 @@ class JointRecord(Record):
 
     @classmethod
     def refuse_key(cls, key: str, others: Sequence[RecordType]) -> str:
-        """Return the message for a key that only joints of other types have."""
+        """Return the message for a `key` that only joints of types `others` have; empty without any."""
         if not others:
             return ""
         having = " or ".join(other.type_name() for other in others if issubclass(other, JointRecord))
@@ -250,23 +250,23 @@ class JointRecord(Record):
         return np.eye(3), self.orientation.T
 
     def turned_around(self, coordinates: Array) -> Array:
-        """Return coordinates (…, k), rad or m, with the sides exchanged: of the first on the second."""
+        """Return coordinates (…, k), rad or m, of the first side relative to the second, from those of the joint."""
         return -coordinates
 
     def rate_turned_around(self, coordinates: Array, rate: Array) -> Array:
-        """Return the rate (…, k), rad/s or m/s, of `turned_around(coordinates)` for this rate (…, k)."""
+        """Return the rate (…, k), rad/s or m/s, of `turned_around(coordinates)` by the `rate` of `coordinates`."""
         return self.turned_around(rate)
 
     def state(self, coordinates: Array) -> Array:
-        """Return q (q_count,) from the scene's values of the position, rad or m."""
+        """Return q (q_count,) of the core, rad or m, from `coordinates` as the scene has them."""
         return coordinates
 
     def velocity(self, rates: Array) -> Array:
-        """Return v (freedoms,) from the scene's values of the rates, rad/s or m/s."""
+        """Return v (freedoms,) of the core, rad/s or m/s, from `rates` as the scene has them."""
         return self.state(rates)
 
     def coordinates(self, q: Array) -> Array:
-        """Return coordinates (…, k), rad or m, in the scene's order from q (…, q_count); likewise rates from v."""
+        """Return coordinates (…, k), rad or m, in the scene's order from the core's q (…, q_count); or rates from v."""
         return q
 
     # What a motor and a gear add; joints that can have them override this.
@@ -277,7 +277,7 @@ class JointRecord(Record):
 
     @property
     def motor_limits(self) -> tuple[MotorLimits, ...]:
-        """Limits of the motor for each coordinate, N·m, rad/s, W or N, m/s, W."""
+        """Limits of the motor along each coordinate, N·m, rad/s, W or N, m/s, W."""
         return ()
 
     @property
@@ -297,7 +297,7 @@ class JointRecord(Record):
 
     @property
     def asks_for_coordinate(self) -> tuple[str, ...]:
-        """Keys for which loops are not cut here: motors without rotors, and springs of rotors, need a coordinate."""
+        """Keys that need a coordinate, so that no loop is cut here: motor without a rotor, spring with one."""
         keys = ("stiffness",) if getattr(self, "rotor_inertia", 0.0) else ("motor",)
         return tuple(key for key in keys if getattr(self, key, None))
 
@@ -385,7 +385,7 @@ class AxialJoint(MovingJoint):
     """Axis of motion in the axes of the first of `between` (ground: global), of any length."""
 
     def triads(self) -> tuple[Array, Array]:
-        """Return triads (3, 3) with z along the axis."""
+        """Return triads (3, 3) of first and second side with z along the axis, columns, in axes of the sections."""
         first = smallest_turn(np.array(self.axis))
         return first, self.orientation.T @ first
 

@@ -27,9 +27,8 @@ from .joint import (
 class RevoluteJoint(GearedJoint):
     """Two points coincide, the second side turns about `axis` by its coordinate, rad; in planar scenes about z.
 
-    Drivetrain: `rotor_inertia` J (kg·m²) of a rotor that sits on the first body, its axis that of the joint, and turns
-    `gear_ratio` times as fast as the second side does on the first. Between the gear of a motor and the second body a
-    spring `stiffness` (N·m/rad; default: rigid; or in steps of the torque) and a damper `damping` (N·m·s/rad).
+    Drivetrain: a rotor on the first body, with the axis of the joint, turns `gear_ratio` times as fast as the second
+    side does on the first. Spring `stiffness` and damper `damping` are between gear and second body.
     """
 
     type: Literal["revolute"]
@@ -44,9 +43,8 @@ class PrismaticJoint(GearedJoint):
 
     In planar scenes the second side keeps the angle of the initial guess.
 
-    Drivetrain: `rotor_inertia` J (kg·m²) of a rotor that turns by `gear_ratio` N (rad/m) times the coordinate: a mass J
-    N² along it; the turning of the rotor by the first side is omitted. Between the gear of a motor and the second body
-    a spring `stiffness` (N/m; default: rigid) and a damper `damping` (N·s/m).
+    Drivetrain: a rotor of inertia J turns by `gear_ratio` N (rad/m) times the coordinate, as a mass J N² along it; its
+    turning by the first side is omitted. Spring `stiffness` and damper `damping` are between gear and second body.
     """
 
     type: Literal["prismatic"]
@@ -141,7 +139,7 @@ class UniversalJoint(AxialJoint):
         return self
 
     def triads(self) -> tuple[Array, Array]:
-        """Return triads (3, 3) with x along the first axis, y along the second."""
+        """Return triads (3, 3) of first and second side, columns: x along the first axis, y along the second."""
         x, y = unit(np.array(self.axis)), unit(self.orientation @ self.second_axis)
         z = unit(np.cross(x, y))
         first = np.stack([x, np.cross(z, x), z], axis=1)
@@ -164,7 +162,7 @@ class SphericalJoint(JointRecord):
     q_count = 4
     freedoms = 3
     loop_equations = (POINT,)
-    locates: ClassVar[bool] = False  # a loop is best cut here: three rows, no angle
+    locates: ClassVar[bool] = False  # a loop is best cut here: three equations, no angle
 
     def state(self, coordinates: Array) -> Array:
         """Return the quaternion (…, 4) of a rotation vector (…, 3), rad."""
@@ -191,7 +189,7 @@ class PlanarJoint(AxialJoint):
     along = (Along("slide", 0), Along("slide", 1), Along("turn", 2))
 
     def turned_around(self, coordinates: Array) -> Array:
-        """Coordinates (…, 3), m, m, rad, of the reversed joint: first side in axes of the second."""
+        """Return coordinates (…, 3), m, m, rad, of the reversed joint: first side in axes of the second."""
         x, y, angle = np.moveaxis(coordinates, -1, 0)
         c, s = np.cos(angle), np.sin(angle)
         return np.stack([-(c * x + s * y), s * x - c * y, -angle], axis=-1)
@@ -238,7 +236,7 @@ class FreeJoint(JointRecord):
     locates: ClassVar[bool] = False
 
     def state(self, coordinates: Array) -> Array:
-        """Return the place (m) and the quaternion, (…, 7), of place and rotation vector (rad), (…, 6)."""
+        """Return position (m) and quaternion, (…, 7), from position (m) and rotation vector (rad), (…, 6)."""
         return np.concatenate([coordinates[..., :3], quaternions(exponential(coordinates[..., 3:]))], axis=-1)
 
     def velocity(self, rates: Array) -> Array:
@@ -246,7 +244,7 @@ class FreeJoint(JointRecord):
         return np.concatenate([rates[:3], self.orientation @ rates[3:]])
 
     def turned_around(self, coordinates: Array) -> Array:
-        """Return place (m) and rotation vector (rad) of the first side, (…, 6), in axes of the second."""
+        """Return position (m) and rotation vector (rad) of the first side, (…, 6), in axes of the second."""
         C = exponential(coordinates[..., 3:])
         back = -np.einsum("...ij,...i->...j", C, coordinates[..., :3])
         return np.concatenate([back, -coordinates[..., 3:]], axis=-1)

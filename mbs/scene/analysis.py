@@ -1,6 +1,6 @@
-"""What all analyses of a scene file have in common, SI units; each kind is a record, in the file that runs it.
+"""Base of all analyses of a scene file, SI units; each kind is a record, in the file that runs it.
 
-THE list of kinds is `ffrobot.scene.kinds`. Times in s.
+All kinds are in `ffrobot.scene.kinds`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -21,7 +21,7 @@ TIGHTEST_TOLERANCE = 1e-10  # round-off in the forces of stiff links is not far 
 
 
 class Need(NamedTuple):
-    """A table that the scene has to have at least once, because of the `value` of a key of an analysis."""
+    """A `table` that the scene must have at least once, as an analysis has the `value` of `key`."""
 
     key: str
     value: str
@@ -36,16 +36,13 @@ class Surroundings(NamedTuple):
     kinds: Callable[[], Sequence[type["Analysis"]]]
 
     def replayable(self, way: str | None = None) -> str:
-        """Kinds that forward runs can replay, for one value of `apply` (`way`) or any, as `"pcid" or "fcid"`."""
+        """Return kinds that forward runs can replay with `apply` = `way` (None: any), as text: `"pcid" or "fcid"`."""
         kinds = [kind for kind in self.kinds() if (way in kind.applicable if way else kind.applicable)]
         return either(kind.kind_name() for kind in kinds)
 
 
 class Analysis(Referring):
-    """One run. `tolerance`: the error aimed at, relative to the peak of each quantity.
-
-    Class attributes say what the rest of the program has to know of a kind.
-    """
+    """One analysis of a scene. Class attributes describe its kind."""
 
     name: Name
     """Name of the analysis, and of its group in the results."""
@@ -54,15 +51,15 @@ class Analysis(Referring):
     tolerance: Annotated[float, Field(ge=TIGHTEST_TOLERANCE, lt=1.0)] = 1e-6
     """Requested error of each result, relative to its peak."""
 
-    follows_trajectories: ClassVar[bool] = True  # whether targets have to have values at all its `times`
-    starts_on_path: ClassVar[bool] = False  # whether it takes the `path` of its context
-    is_motion: ClassVar[bool] = True  # whether it finds a motion, at whose instants other analyses may look
-    is_integrated: ClassVar[bool] = False  # whether that comes from an integration over time
+    follows_trajectories: ClassVar[bool] = True  # whether trajectories must have values at all its `times`
+    starts_on_path: ClassVar[bool] = False  # whether it uses the `path` of its context
+    is_motion: ClassVar[bool] = True  # whether it finds a motion, at instants of which other analyses may start
+    is_integrated: ClassVar[bool] = False  # whether this motion comes from an integration over time
     is_algebraic: ClassVar[bool] = False  # whether each output is solved for by itself
-    is_resumable: ClassVar[bool] = False  # whether a run that was stopped can be gone on with, under one tolerance
-    allocates_patches: ClassVar[bool] = False  # whether patches and actuation points have to carry the forces it finds
-    needs_actuators: ClassVar[bool] = False  # whether it makes sense only with motors or patches
-    supplies_all: ClassVar[bool] = False  # whether motors and patches leave less than its tolerance, or it says so
+    is_resumable: ClassVar[bool] = False  # whether a stopped run can be continued, under the same tolerance
+    allocates_patches: ClassVar[bool] = False  # whether patches and actuation points must supply the forces it finds
+    needs_actuators: ClassVar[bool] = False  # whether it needs motors or patches
+    supplies_all: ClassVar[bool] = False  # whether motors and patches follow the path within its tolerance, or it warns
     follows_jerk: ClassVar[bool] = False  # whether torques jump where the jerk of a path does
     takes_actuation: ClassVar[bool] = False  # whether it replays the actuation of its `source`
     applicable: ClassVar[tuple[str, ...]] = ()  # values of `apply` by which forward runs can replay what it finds
@@ -70,7 +67,7 @@ class Analysis(Referring):
 
     @property
     def is_repeated(self) -> bool:
-        """Whether it takes the steps of another run again, which has been checked and judged."""
+        """Whether it repeats the time steps of another run, which has been checked and judged."""
         return False
 
     @classmethod
@@ -80,7 +77,7 @@ class Analysis(Referring):
 
     @classmethod
     def refuse_key(cls, key: str, others: Sequence[type[Record]]) -> str:
-        """Return the message for a key of other kinds."""
+        """Return the message for a `key` that only the kinds `others` have; empty without any."""
         if not others:
             return ""
         kinds = either(other.kind_name() for other in others if issubclass(other, Analysis))
@@ -103,7 +100,7 @@ class Analysis(Referring):
 
     @property
     def source(self) -> str | None:
-        """Name of the earlier analysis that this one rests on; None where there is none."""
+        """Name of the earlier analysis whose results this one uses; None where there is none."""
         return None
 
     @property
@@ -116,16 +113,16 @@ class Analysis(Referring):
         raise NotImplementedError
 
     def needs(self) -> Iterator[Need]:
-        """Tables without which the scene makes no sense: of an inverse analysis, something to follow."""
+        """Yield tables that the scene must have: for an inverse analysis, a trajectory."""
         if self.applicable:
             yield Need("kind", self.kind, "trajectory")
 
     def prescribed(self) -> Iterator[tuple[str, TimeFunction, int]]:
-        """Keys and functions of time that must exist at all `times`, and the number of derivatives."""
+        """Yield key, function of time that must exist at all `times`, and number of derivatives that must exist."""
         yield from ()
 
     def problems(self, among: Surroundings) -> Iterator[str]:
-        """Yield what does not fit the other analyses of the scene, a line each."""
+        """Yield a message for each contradiction to the other analyses of the scene."""
         yield from ()
 
 
@@ -241,11 +238,11 @@ class ActuatedAnalysis(IntegratedAnalysis):
 
     @property
     def source(self) -> str | None:
-        """The analysis whose actuation it takes."""
+        """Name of the analysis whose actuation is applied."""
         return self.actuation
 
     def problems(self, among: Surroundings) -> Iterator[str]:
-        """Whether there is such an analysis, and whether it can be replayed."""
+        """Yield a message if `actuation` names no earlier analysis, or one that cannot be replayed."""
         if self.actuation is None:
             return
         sources = {source.name: source for source in among.earlier}
@@ -270,12 +267,12 @@ class ActuatedAnalysis(IntegratedAnalysis):
         yield from self.replay_problems(source)
 
     def replay_problems(self, source: Analysis) -> Iterator[str]:
-        """Yield what of `source` cannot be applied as requested, a line each."""
+        """Yield a message for each result of `source` that cannot be applied as requested."""
         yield from ()
 
 
 def output_times(end: float, step: float, before: float = 0.0, after: float = 0.0) -> Array:
-    """Return output times (T,), s: multiples of `step` from −`before` to `end` + `after`; `end` exactly."""
+    """Return output times (T,), s: multiples of `step` from −`before` to `end` + `after`, all s; `end` exactly."""
     if not (end and step):
         return np.zeros(1)
     early, late, count = (round(x / step) for x in (before, after, end))

@@ -35,7 +35,7 @@ def tensor(inertia: Inertia) -> Array:
 
 
 def check_inertia(inertia: Inertia) -> Inertia:
-    """Return it (kg·m²). Raises `ValueError` unless symmetric, with no principal moment over the sum of the others.
+    """Return `inertia`, kg·m². Raises `ValueError` if unsymmetric, or a principal moment exceeds the sum of the others.
 
     Moments may be zero: those of a point mass, and of a rod about its axis.
     """
@@ -82,7 +82,7 @@ class Visual(Record):
 
 
 class RigidBody(Record):
-    """Mass (kg), inertia about the center (kg·m²), center and named points (m), in the axes of the body."""
+    """A rigid body, with all vectors in its axes."""
 
     mass: Positive
     """Mass, kg."""
@@ -166,7 +166,7 @@ class Tool(Referring):
 
     @property
     def reference(self) -> str:
-        """The point that it is, "BODY.NAME"."""
+        """Reference to the tool as a point, "BODY.NAME"."""
         return f"{split_point(self.point)[0]}.{self.name}"
 
 

@@ -70,7 +70,7 @@ class Load(Referring):
 
     @property
     def moments(self) -> tuple[TimeFunction, ...]:
-        """Along each coordinate of the joint."""
+        """Torques, N·m (or N), along each coordinate of the joint, as functions of time; empty of other loads."""
         if self.moment is None:
             return ()
         return self.moment if isinstance(self.moment, tuple) else (self.moment,)

@@ -1,4 +1,4 @@
-"""What a scene says of a mechanism: bodies, joints, trajectories, loads, and the state it starts from."""
+"""Keys of the mechanism in a scene: bodies, joints, trajectories, loads, and the initial state."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -67,11 +67,11 @@ class Initial(Referring):
     _named: dict[str, frozenset[str]] = PrivateAttr(default_factory=dict)
 
     def named(self, table: Literal["joints", "joint_rates"]) -> frozenset[str]:
-        """The joints with values in the file: their own, or those of both bodies that they connect."""
+        """Return names of joints with values in the file: their own, or those of both bodies that they connect."""
         return self._named.get(table, frozenset(getattr(self, table)))
 
     def naming(self, **named: frozenset[str]) -> Self:
-        """Return the guesses with these joints in `named`, by table, beside values for all other joints."""
+        """Return a copy of which `named(table)` has the joints given for each table, though others have values, too."""
         copy = self.model_copy()
         copy._named = named
         return copy
@@ -122,7 +122,7 @@ class MechanismKeys(Record):
 
     @property
     def edges(self) -> list[Edge]:
-        """Joints of the spanning forest, ranked by where loops are cut.
+        """All joints as edges between bodies, ranked by where loops are cut.
 
         Loops are cut first at spherical joints, then at joints without forces (those without a value in [initial]
         before the others), with friction or loads, and last with a rotor or a trajectory. Motors without rotors, and
@@ -153,7 +153,7 @@ class MechanismKeys(Record):
 
     @property
     def topology(self) -> Topology:
-        """Return which joint carries which body, by indices of `joint`."""
+        """Joint that carries each body, and joints that close loops, by indices of `joint`."""
         return spanning_forest([body.name for body in self.body], self.edges)
 
     @property
@@ -194,10 +194,10 @@ Values = Mapping[str, float]
 
 
 def in_3d(scene: S) -> S:
-    """The scene with guesses of joints for those of bodies; the scene itself where it is spatial.
+    """Return a planar scene with initial guesses of joints in place of those of bodies; spatial scenes unchanged.
 
     The guess of a revolute joint is the angle of its second body on the first, in rad; welds and prismatic joints keep
-    that angle. Likewise for rates. Bodies that no joint carries are in the plane on one of their own name.
+    that angle. Likewise for rates. A body that no joint carries has guesses of a planar joint of its name.
     """
     if scene.space != "planar":
         return scene

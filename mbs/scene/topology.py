@@ -16,7 +16,7 @@ class Edge(NamedTuple):
 
 
 class Carrier(NamedTuple):
-    """Joint that carries a body: its index, the body's `own` side and the `other` side."""
+    """Joint that carries a body: its index, its side on the body (`own`) and the `other` side."""
 
     joint: int
     own: str
@@ -32,8 +32,8 @@ class Carrier(NamedTuple):
 class Topology:
     """Spanning forest of a mechanism, and the joints that close its loops."""
 
-    # of each body the joint on the way to the root of its tree, None of a root; bodies stand in an order in which each
-    # comes after its parent, those on the ground first
+    # by body the joint on the way to the root of its tree, None of a root; each body comes after its parent, trees on
+    # the ground first
     carriers: dict[str, Carrier | None]
     loop_joints: tuple[int, ...]  # numbers of the joints that are in no tree: each closes a loop
 
@@ -46,7 +46,7 @@ class Topology:
 def spanning_forest(bodies: Sequence[str], joints: Sequence[Edge]) -> Topology:
     """Return the topology of `joints` between `bodies`: trees from the ground, then from each unconnected body.
 
-    A tree takes the joint of the lowest rank, and the first among such, of all between it and the rest (Prim, Bell
+    A tree grows by the joint of the lowest rank, the first among equals, of all between it and the rest (Prim, Bell
     Syst. Tech. J. 36, 1957).
     """
     touching: dict[str, list[int]] = {name: [] for name in (GROUND, *bodies)}

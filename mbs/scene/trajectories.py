@@ -63,7 +63,7 @@ class Shaper(Record):
         return self
 
     def shape(self, motion: Piecewise) -> Piecewise:
-        """The motion, shaped for each frequency; unchanged as long as there is none."""
+        """Return the motion shaped for each frequency; unchanged without `frequency`."""
         if self.kind == "none" or self.frequency is None:
             return motion
         for frequency in np.atleast_1d(self.frequency):
@@ -288,19 +288,19 @@ class Trajectory(Referring):
 
     @property
     def coordinate_of(self) -> str | None:
-        """The joint whose coordinate, or whose motor's, follows it."""
+        """Name of the joint whose coordinate, or whose motor, follows the trajectory; None if neither does."""
         return self.joint if self.motor is None else self.motor
 
     @property
     def force_components(self) -> tuple[str, ...]:
-        """Names of the force components: `components`, then moments about global axes or two about a tool axis."""
+        """Components of the path force by name: `components`, then moments about global axes, or two of a tool axis."""
         if self.orientation is None:
             return tuple(self.components)
         return (*self.components, *(("mx", "my", "mz") if self.tool_axis is None else ("tool 1", "tool 2")))
 
     @cached_property
     def path(self) -> Piecewise | None:
-        """Polynomial motion of the point or joint; None for expressions."""
+        """Polynomial motion of the point (m), joint or angle (rad, m); None for expressions."""
         if self.via is not None:
             return self._through(self._places[:, :3])
         if self.waypoints is None:
@@ -311,12 +311,12 @@ class Trajectory(Referring):
 
     @cached_property
     def stopping(self) -> Piecewise | None:
-        """Return `path` with a stop at each place; None if it has these stops."""
+        """Return `path` with a stop at each waypoint; None if it already stops there."""
         return self.model_copy(update={"blend": 0.0})._through(self._places[:, :3]) if self.blend else None
 
     @cached_property
     def components(self) -> dict[str, TimeFunction]:
-        """The specified functions of time by component: "x", "y", "z", or "value"."""
+        """Specified functions of time by component: "x", "y", "z" (m), or "value" (rad, m)."""
         if self.path is None:
             return given_in(self, (*PLACES, "value"))
         if self.waypoints is not None:
@@ -327,7 +327,7 @@ class Trajectory(Referring):
 
     @property
     def targets(self) -> list[tuple[str, TimeFunction]]:
-        """All functions of time that it follows, by component; those of an orientation by its kind."""
+        """All specified functions of time, by component; those of an orientation by the name of its key."""
         law = self.orientation
         turning = [] if law is None else [(law.kind, function) for function in law.functions]
         return [*self.components.items(), *turning]
