@@ -64,18 +64,15 @@ inline void accelerate_joint(const Node<Space> &node, const T *q, Hinge<Space, T
   acceleration_by_freedoms<-1>(node, hinge, A);
   if (node.shape.in_inner_axes) {
     const int linear = node.joint == JointKind::free ? Space::linear : 2;
-    T u[6] = {x[0], x[1], T(0.), T(0.), T(0.), T(0.)}, turned[6];
-    if (linear == 3)
-      u[2] = x[2];
+    T u[6] = {x[0], x[1], linear == 3 ? x[2] : T(0.), T(0.), T(0.), T(0.)}, turned[6];
     change_section<true>(node, q, u, turned);
     for (int k = 0; k < linear; ++k)
       x[k] = turned[k];
   }
-  for (int k = 0; k < node.shape.freedoms.count; ++k)
-    if (const T *target = W > 1 ? prescribed(node, hinge, w, k) : nullptr)
-      a[k] = *target;
-    else
-      a[k] = x[k];
+  for (int k = 0; k < node.shape.freedoms.count; ++k) {
+    const T *target = W > 1 ? prescribed(node, hinge, w, k) : nullptr;
+    a[k] = target ? *target : x[k];
+  }
 }
 
 // Accelerations of ports, and forces f on those that modes move or that carry a joint, whose forces steps are judged

@@ -103,7 +103,7 @@ template <class Space, class T> FFROBOT_NOINLINE void locate(const T *q, Workspa
   for (std::size_t i = 0; i < w.m.nodes.size(); ++i) {
     const Node<Space> &node = w.m.nodes[i];
     const Hinge<Space, T> &hinge = w.hinges[i];
-    Pose<T> inner, at{};
+    Pose<T> inner;
     if (node.parent < 0)
       ground_motion(w.m.ground[node.parent_port], inner);
     else
@@ -114,8 +114,6 @@ template <class Space, class T> FFROBOT_NOINLINE void locate(const T *q, Workspa
     // origin and velocity of the outer section; its axes are those of the frame, or of the inboard port
     frame.angle = inner.angle + joint_angle(node, q, w.bodies[i]);
     T r[3] = {T(0.), T(0.), T(0.)}, r_dot[3] = {T(0.), T(0.), T(0.)}, arm[3], rate[3], swept[3];
-    for (int k = 0; k < 3; ++k)
-      at.r[k] = at.v[k] = T(0.);
     Pose<T> local = frame, section = frame;
     if (node.inboard >= 0) {
       for (int k = 0; k < 3; ++k)

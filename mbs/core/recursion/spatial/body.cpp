@@ -115,15 +115,12 @@ SpatialData moved(const SpatialData &data, const Vector3d &position, const Matri
     for (int k = 0; k < 3; ++k)
       for (int l = 0; l < 3; ++l)
         to.I_bar.middleRows<3>(3 * k) += R(k, l) * R * I_bar.middleRows<3>(3 * l);
-    for (int k = 0; k < 3; ++k)
-      for (int l = 0; l < 3; ++l) {
-        MatrixXd sum = MatrixXd::Zero(n, n);
-        for (int i = 0; i < 3; ++i)
-          for (int j = 0; j < 3; ++j)
-            if (data.S_bar_kl[3 * i + j].size())
-              sum += R(k, i) * R(l, j) * data.S_bar_kl[3 * i + j];
-        to.S_bar_kl[3 * k + l] = sum;
-      }
+    for (int kl = 0; kl < 9; ++kl) {
+      to.S_bar_kl[kl].setZero(n, n);
+      for (int ij = 0; ij < 9; ++ij)
+        if (data.S_bar_kl[ij].size())
+          to.S_bar_kl[kl] += R(kl / 3, ij / 3) * R(kl % 3, ij % 3) * data.S_bar_kl[ij];
+    }
   }
   if (data.is_stiffened())
     move_stiffening(data, position, R, to);
