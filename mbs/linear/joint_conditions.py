@@ -53,9 +53,9 @@ class RobotModes:
 
 
 def robot_modes(K: Array, D: Array, back: Array, transformation: Array) -> RobotModes:
-    """Poles and shapes of z̈ + D̂ ż + K̂ z = 0.
+    """Poles and shapes of z̈ + D̂ ż + K̂ z = 0, where K̂, 1/s², and D̂, 1/s, are (f, f).
 
-    K̂ and D̂ are (f, f); `back` (s, f) takes z to δs, and `transformation` (coordinates, s) takes δs to δq.
+    `back` (s, f) takes z to δs, and `transformation` (coordinates, s) takes δs to δq.
     """
     f = len(K)
     if np.any(D):
@@ -86,7 +86,7 @@ def _pairs(poles: ComplexArray) -> Indices:
 
 
 class FreeCoordinates(NamedTuple):
-    """z of unit kinetic amplitude with δs = N z (f, m), NᵀK N and NᵀD N (m, m)."""
+    """Free coordinates z (m,) with NᵀM N = 1: δs = N z, N (f, m), K = NᵀK N, 1/s², and D = NᵀD N, 1/s, (m, m)."""
 
     N: Array
     K: Array
@@ -105,7 +105,7 @@ class JointCondition:
 
 
 class Stiffness(NamedTuple):
-    """Stiffness of a point, N/m: `along` each axis (d,), and the `least` of all directions with that one (d,)."""
+    """Stiffness of a point, N/m: `along` each of d axes (d,), and the `least`, with its `direction` (d,)."""
 
     along: Array
     least: float
@@ -113,7 +113,7 @@ class Stiffness(NamedTuple):
 
 
 def translational_stiffness(compliance: Array) -> Stiffness | None:
-    """The stiffness of a point from its compliance, SI units, (3, 3), planar, or (6, 6); None if it can move freely.
+    """The stiffness of a point from its compliance (3, 3), planar, or (6, 6), SI units; None if it can move freely.
 
     Directions whose compliance is round-off have infinite stiffness.
     """
@@ -129,7 +129,7 @@ def translational_stiffness(compliance: Array) -> Stiffness | None:
 
 
 def joint_conditions(mechanism: LinearMechanism) -> dict[str, JointCondition]:
-    """Conditions "locked", and with compliant gears "compliant", for the points of `mechanism`."""
+    """Return the condition "locked" (joints), and with compliant gears "compliant" (motors locked), by name."""
     has_gears = any(name.startswith("motor/") for name in mechanism.outputs)
     largest, conditions = np.sqrt(np.diag(np.linalg.inv(mechanism.M))), {}
     for condition in (LOCKED, COMPLIANT)[: 1 + has_gears]:
@@ -145,7 +145,7 @@ def joint_conditions(mechanism: LinearMechanism) -> dict[str, JointCondition]:
 
 
 def free_coordinates(mechanism: LinearMechanism, condition: str) -> FreeCoordinates:
-    """The coordinates of joints and modes that are free in the condition."""
+    """The coordinates of joints and modes that are free with joints "locked", or in the `condition` "compliant"."""
     joints = [name for name in mechanism.inputs if name.startswith("joint/")]
     if condition == LOCKED:  # motors behind compliant gears stand still, too
         names = [*joints, *(name for name in mechanism.outputs if name.startswith("motor/"))]
@@ -159,13 +159,13 @@ def free_coordinates(mechanism: LinearMechanism, condition: str) -> FreeCoordina
 
 
 def frequency_response(free: FreeCoordinates, J: Array, omega: Array) -> ComplexArray:
-    """(F, k) motion along each row of `J` (k, f) per unit load along it, at `omega` (F,), rad/s."""
+    """(F, k) motion per unit load along each row of the Jacobian `J` (k, f), m/N or rad/(N·m); `omega` (F,), rad/s."""
     J = J @ free.N
     return np.asarray(np.einsum("ki,fik->fk", J, vibration(np.eye(len(J.T)), free.K, free.D, J, omega)))
 
 
 def vibration(M: Array, K: Array, D: Array, J: Array, omega: Array) -> ComplexArray:
-    """Coordinates (F, f, k) (K + iωD − ω²M)⁻¹ Jᵀ by unit loads along rows `J` (k, f), at `omega` (F,)."""
+    """Coordinates (F, f, k) (K + iωD − ω²M)⁻¹ Jᵀ by unit loads along rows of `J` (k, f), at `omega` (F,), rad/s."""
     w = omega[:, None, None]
     return np.asarray(np.linalg.solve(K + 1j * w * D - w**2 * M, np.broadcast_to(J.T, (len(omega), *J.T.shape))))
 

@@ -1,13 +1,10 @@
 """The equations of motion, linear about a posture or a motion, in independent coordinates.
 
-The core differentiates them exactly (core/recursion/inverse/force_slopes.h). For increments δ of the
-coordinates of the tree, rotation vectors in body axes for orientations, δ̇ = δv + B δ; B = −ω~ at orientations, else 0.
-Loops leave δ = H δs and δv = H δv_s + N δs, where v_s are the rates of the independent coordinates s. So
+docs/theory.md, Linear models; the core differentiates them exactly (core/recursion/inverse/force_slopes.h). Increments
+δ of the tree's coordinates have δ̇ = δv + B δ, and loops leave δ = H δs and δv = H δv_s + N δs, where v_s are the rates
+of the independent coordinates s. So Ḣ = N − H B_s H.
 
-    δv = H δṡ + Ḣ δs,  Ḣ = N − H B_s H;    δs̈ = a_v,s (H δṡ + Ḣ δs) + a_q,s H δs + d/dt (B_s δ).
-
-Held are the forces along s that drive the motion; moments of motors that turn frames are held in their place, and what
-these do on modes turns with the sections at them.
+Forces along s that drive the motion are constant; in their place, moments of motors that turn frames.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -31,7 +28,7 @@ DEPENDENT = 1e-8  # of a row's gradient, what others must leave of it to count a
 
 @struct
 class LinearMechanism:
-    """M δs̈ + D δṡ + K δs = inputs · δu about (time, q, v, a); f independent coordinates s."""
+    """M δs̈ + D δṡ + K δs = inputs · δu about (time, q, v, a); f independent coordinates s. SI units."""
 
     time: float
     q: Array
@@ -52,11 +49,11 @@ class LinearMechanism:
     tool_axes: Mapping[str, Array]
     transformation: Array  # H = ∂q/∂s (coordinates, f)
     transformation_rate: Array  # its rate along the motion: δv = H δṡ + H_dot δs
-    force: Array  # (f,) what drives the motion itself: forces along the independent rows, modal forces beside the loads
+    force: Array  # (f,) forces along s that drive the motion itself, modal forces beside the loads
     names: tuple[str, ...]  # (f,) of s: "joint/NAME" (or what was chosen instead), then "modal/BODY/k", k from 1
 
     def of_tool(self, point: str) -> Array:
-        """Rows (k, f) as `points`, m and rad by s, in the axes of a point that has its own."""
+        """Jacobian (k, f) of "BODY.POINT" by s, m and rad, as in `points`, but in axes of the point, if it has any."""
         J = self.points[point]
         return self.tool_axes[point] @ J if point in self.tool_axes else J
 
@@ -66,8 +63,8 @@ class LinearEquations:
 
     `model` has no trajectories; its gears are compliant where its tree says so. Independent are motors' coordinates
     where loops leave them so, then other joint coordinates, and modes, those first that the loops determine worst at
-    `q` (QR with pivoting). `points` ("BODY.POINT") are in- and outputs; a mapping says where each is in the model,
-    where that is another body's point (of a link in pieces).
+    `q` (n_q,) (QR with pivoting). At `points`, "BODY.POINT" of the scene, forces are inputs and places outputs; as a
+    mapping, they have their points of the model (of links in pieces).
     """
 
     def __init__(self, model: Model, q: Array, points: Sequence[str] | Mapping[str, str] = ()) -> None:
@@ -194,7 +191,7 @@ class LinearEquations:
 
 
 def labelled(model: Model, joint: str) -> Iterator[tuple[str, int]]:
-    """Coordinates of a joint, "joint/NAME", or "joint/NAME 1", "joint/NAME 2" of several, and where each is in v."""
+    """Yield the name of each coordinate of a joint, "joint/NAME" or "joint/NAME 1", …, and its number in v."""
     return _labelled(joint, model.columns(joint))
 
 

@@ -36,7 +36,7 @@ class PoseEvaluator:
     """Evaluates undeformed postures of a robot with motors locked; links and compliant gears deform under loads.
 
     Attributes:
-        motors: names of the coordinates of motors, as `torque` has them.
+        motors: names of the coordinates of motors, in the order of `torque`.
         segments: pairs of sections, straight lines between which show the robot: from that at which a body is carried
             to those at which it carries others, and to the point.
     """
@@ -76,10 +76,10 @@ class PoseEvaluator:
     def at(self, q: Array) -> dict[str, Array]:
         """Findings by name in the undeformed posture q (n_q,), SI. Raises `SolveError` where there is no equilibrium.
 
-        joints_locked and joints_compliant: `frequency` (count,) Hz, `compliance` (k, k), `stiffness` (d,) and
-        `least_stiffness` N/m, its `direction` (d,), `response` (F, d) m/N. Else: `sag` (d,) m of the point, `torque`
-        (motors,) N·m or N, `place` (d,) m, `manipulability`, √det(J Jᵀ) of the point's velocity by the rates of joints
-        with motors (Yoshikawa, 1985), `robot` (segments, 2, 3) m.
+        In a space of d axes and k ways, of the point: `place` and `sag` (d,) m, `manipulability`, √det(J Jᵀ) of its
+        velocity by the rates of joints with motors (Yoshikawa, 1985); by "joints_locked/…" and "joints_compliant/…":
+        `frequency` (count,) Hz, `compliance` (k, k), `stiffness` (d,) and `least_stiffness` N/m, its `direction` (d,),
+        `response` (F, d) m/N. Of the robot: `torque` (motors,) N·m or N, `robot` (segments, 2, 3) m.
         """
         q, tree = self._all(q), self.model.tree
         before = self._place(q)
@@ -116,9 +116,10 @@ class PoseEvaluator:
         return self.space.along(tree.places(q[None]).at(tree.section(self.point)).r[0])
 
     def linear_equations(self, q: Array, near: Array | None = None) -> tuple[LinearMechanism, Array]:
-        """The linear equations about the equilibrium next to the undeformed q (n_q,), rad and m, and its coordinates.
+        """The linear equations about the equilibrium near the undeformed q (n_q,), and its coordinates, rad and m.
 
-        `near`: those of a like robot's equilibrium, from which this one is sought. Raises as `at`.
+        `near`: coordinates of a similar robot's equilibrium, from which this one is sought in place of q. Raises
+        `SolveError` where there is no stable one.
         """
         return self._equilibrium(self._all(q) if near is None else near)
 

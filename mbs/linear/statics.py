@@ -53,10 +53,7 @@ def initial_state(model: Model, undeformed: State) -> State:
 
 
 def hanging_joints(model: Model, undeformed: State, start: State) -> Iterator[str]:
-    """Warnings where the equilibrium `start` has joints elsewhere than [initial], as nothing keeps them there.
-
-    And where it is unstable.
-    """
+    """Yield warnings where the equilibrium `start` is unstable, or has joints away from `undeformed`, by [initial]."""
     if model.scene.initial.state != "static":
         return
     away, scales, moved = np.abs(start.q - undeformed.q), model.joint_sizes, []
@@ -78,10 +75,10 @@ def newton(
     states: Array,
     most: int = MOST_ITERATIONS,
 ) -> tuple[Array, Booleans]:
-    """The states (T, …) that `correct` leads to in at most so many steps, and which of them are met (T,).
+    """Newton's method from `states` (T, …) in at most `most` steps: the states it leads to, and which converge (T,).
 
-    `correct`(states, their numbers), called for those that are not met yet, has their steps (T, n) in natural sizes,
-    and which are met once they have made them (T,). `move`(states, steps) takes them on.
+    `correct`(states, their numbers), called for those that do not converge yet, returns their steps (T, n) in natural
+    sizes, and which converge with these (T,). `move`(states, steps) returns the next states.
     """
     states, met, going = states.copy(), np.zeros(len(states), dtype=bool), np.arange(len(states))
     for _ in range(most):
@@ -97,15 +94,15 @@ def newton(
 
 
 class Balance(NamedTuple):
-    """Forces and equations at a posture, in natural sizes: N·m, rad, sizes of the robot and of modes."""
+    """Forces and m constraint equations at a posture, in natural sizes: N·m, rad, sizes of the robot and of modes."""
 
     load: Array  # (n_v,) Q
     left: Array  # (n_v,) Q − C_vᵀ λ
-    missed: Array  # (rows,) C
-    gradient: Array  # (rows, n_v) C_v, 0 of equations that depend on others
-    multipliers: Array  # (rows,) λ in N·m, with 0 of these
+    missed: Array  # (m,) C
+    gradient: Array  # (m, n_v) C_v, 0 of equations that depend on others
+    multipliers: Array  # (m,) λ in N·m, 0 of equations that depend on others
     independent: list[int]  # numbers of the other equations
-    size: float  # N·m, of the largest force that meets others there
+    size: float  # N·m, of the largest single force
 
 
 Relief = tuple[Array | float, Array | float]
@@ -120,9 +117,9 @@ class Statics:
         self.sizes, self.row_sizes, self.length = model.natural_sizes, model.row_sizes, model.size
 
     def equilibrium(self, q: Array, locked: Indices | None = None) -> Array:
-        """The equilibrium (n_q,), rad and m, that Newton's method reaches from q (n_q,), with v[`locked`] kept.
+        """The equilibrium (n_q,), rad and m, that Newton's method reaches from q (n_q,).
 
-        Raises `SolveError` that says what is left where it reaches none.
+        Coordinates of v with numbers `locked` stay. Raises `SolveError` where it reaches none.
         """
         tree = self.model.tree
         free = np.delete(np.arange(tree.n_v), [] if locked is None else locked)
@@ -181,7 +178,7 @@ class Statics:
         return q, taken == 1.0
 
     def balance(self, q: Array, free: Indices, relief: Relief = (0.0, 0.0)) -> Balance:
-        """Forces at q (n_q,), less `relief`, with multipliers that balance them best along v[`free`]; natural sizes."""
+        """Forces at q (n_q,), rad and m, less `relief`, with multipliers that balance them best along v[`free`]."""
         at, J = self._at_rest(q)
         independent = _independent(J[:, free])
         J[np.setdiff1d(np.arange(len(J)), independent)] = 0.0
@@ -198,20 +195,20 @@ class Statics:
         return Balance(Q, Q - multipliers @ J, missed, J, multipliers, independent=independent, size=size)
 
     def stiffness(self, q: Array, at: Balance) -> Array:
-        """∂(C_vᵀ λ − Q)/∂q (n_v, n_v) in natural sizes at q (n_q,), exact."""
+        """Exact ∂(C_vᵀ λ − Q)/∂q (n_v, n_v) in natural sizes at q (n_q,), rad and m, with the multipliers of `at`."""
         multipliers = at.multipliers / self.row_sizes * self.model.row_signs
         K = self.system.core.stiffness_at_rest(self.system.scene, self.t, q, multipliers, at.independent)
         return K * self.sizes * self.sizes[:, None]
 
     def holding_multipliers(self, q: Array) -> Array:
-        """λ (rows,) with C_vᵀ λ = Q at q (n_q,), N or N·m; in natural sizes the least if rows depend on others."""
+        """Multipliers λ with C_vᵀ λ = Q at q (n_q,), N or N·m, by equation; the least if some are redundant."""
         at, J = self._at_rest(q)
         return np.linalg.lstsq(J.T, at.Q * self.sizes, rcond=DEPENDENT)[0] / self.row_sizes
 
     def unstable_ways(self, q: Array) -> Iterator[str]:
-        """A warning if the equilibrium q (n_q,) is unstable.
+        """Yield a warning if the equilibrium q (n_q,), rad and m, is unstable.
 
-        There the forces that lead back have a derivative with a negative eigenvalue on what the rows leave free.
+        Then ∂(C_vᵀ λ − Q)/∂q has a negative eigenvalue in the directions that constraints leave free.
         """
         tree = self.model.tree
         at = self.balance(q, np.arange(tree.n_v))
@@ -280,7 +277,7 @@ def _step(at: Balance, K: Array, free: Indices) -> Array:
 
 
 def static_equilibrium(model: Model, start: State) -> State:
-    """The equilibrium at t = 0 near `start`; v is kept on Ċ = 0. Raises `SolveError` where there is none near it."""
+    """The equilibrium at t = 0 near `start`, its v with Ċ = 0. Raises `SolveError` where there is none."""
     q = Statics(model).equilibrium(start.q)
     return State(q, rates_on_rows(model, q, start.v))
 
@@ -292,12 +289,12 @@ def static_shapes(
     stiffness: Callable[[Array, Indices], Array],
     count: int,
 ) -> tuple[Array, Booleans]:
-    """Shapes p (T, n) of all bodies on which `forces` leave nothing, at T = `count` times, and which are met (T,).
+    """Modal coordinates p (T, n) of all bodies with zero residual `forces` at `count` T times; which are found (T,).
 
-    `omega`, `sizes` (n,): frequencies of the modes, rad/s, and p that bends a link by about its length.
-    Joints follow the shapes: `forces`(p, numbers of times) are those on modes (k, n), `stiffness` is their derivative
-    (k, n, n): of one of `NEIGHBORS` times at first, and of each where steps shrink slowly. Shapes that bend a link by
-    more than about its length are not met.
+    `omega`, `sizes` (n,): frequencies of the modes, rad/s, and p, m·√kg, that bends a link by about its length: beyond
+    it nothing counts as found. `forces`(p, numbers of times) returns residual modal forces (k, n) with joints that
+    follow p; `stiffness` returns their derivative (k, n, n): at one of `NEIGHBORS` times at first, then at each time
+    whose steps shrink slowly.
     """
     K, ratio, before = np.zeros((count, len(omega), len(omega))), np.full(count, SLOW), np.full(count, np.inf)
     least = STRAIGHT * float((omega * sizes).min(initial=np.inf))

@@ -18,7 +18,7 @@ from ..posture.redundancy import resolved
 from ..posture.start import relaxed_gears, undeformed_posture
 
 DEPENDENT = 1e-9  # of the largest singular value: below it a row repeats others
-RIGID = 1e-9  # of the largest strain of a unit motion, each in units of its spring: below it there is none
+RIGID = 1e-9  # of the largest strain of a unit motion, in units of its spring
 
 
 class Vibrations(NamedTuple):
@@ -66,7 +66,7 @@ def gear_matrices(tree: KinematicTree, q: Array) -> tuple[Array, Array]:
 
 
 def elastic_shapes(M: Array, K: Array, C_v: Array) -> tuple[Array, Array]:
-    """ω² (n,) and M-orthonormal shapes (n_v, n) that strain springs while C_v q̇ = 0; all in natural sizes."""
+    """ω² (n,), 1/s², and M-orthonormal shapes (n_v, n) that strain springs while C_v q̇ = 0; all in natural sizes."""
     free = null_space(C_v, DEPENDENT)
     L_inverse = np.linalg.inv(np.linalg.cholesky(free.T @ M @ free))
     squares, vectors = np.linalg.eigh(L_inverse @ free.T @ K @ free @ L_inverse.T)
@@ -84,7 +84,7 @@ INSTANTS = 9
 
 @struct
 class PathFrequencies:
-    """The lowest vibrations of the undeformed robot at instants of a path: (instants, modes), Hz and damping ratios."""
+    """The lowest vibrations of the undeformed robot at instants of a path: Hz and damping ratios, (instants, modes)."""
 
     frequency: Array
     damping_ratio: Array
@@ -93,7 +93,7 @@ class PathFrequencies:
 def frequencies_along(model: Model, begin: float, end: float, modes: int) -> PathFrequencies:
     """The `modes` lowest vibrations of the undeformed robot on its trajectories, from `begin` to `end`, s.
 
-    Where motors follow them, compliant gears are among its springs. Joints that the paths leave free are free.
+    Where motors follow these, compliant gears are among the springs. Joints that the paths leave free are free.
     Raises `InputError` where the path is out of reach, or there are fewer vibrations.
     """
     model = with_prescribed_motors(resolved(model, end))
@@ -120,10 +120,9 @@ def frequencies_along(model: Model, begin: float, end: float, modes: int) -> Pat
 
 
 def with_robot_damping(model: Model, ratios: Mapping[str, float]) -> Model:
-    """The robot with links so damped that its vibrations have the damping ratios ζ, given by body, where all agree.
+    """The robot with modal damping by which vibrations of the whole robot have ζ = `ratios` (by body) if all are equal.
 
-    At the initial posture, motors free, gears rigid. Bodies not named keep the damping that they have.
-    docs/theory.md, Damping.
+    At the initial posture, motors free, gears rigid; docs/theory.md, Damping. Other bodies keep their damping.
     """
     if not ratios:
         return model

@@ -33,10 +33,10 @@ SAME = 1e-6  # rad: angles that differ by less
 
 
 class StartPosture(NamedTuple):
-    """Initial posture of a robot, rad and m, with the guess that selects it.
+    """Posture `q` (n_q,), rad and m, in which a robot can start, with the guess that selects it.
 
-    `q` (n_q,); `guess`, the line of [initial] that chooses it, and `guesses`, its coordinates by joint; `away` (rad),
-    the largest turn to it; `branch`, how its joints stand, by name (see `branch_names`).
+    `guess` is the line for the scene's table [initial], `guesses` its coordinates by joint, rad and m; `away`, rad, is
+    the largest angle to the scene's start; `branch` has words such as "up" by joint (see `branch_names`).
     """
 
     q: Array
@@ -47,10 +47,10 @@ class StartPosture(NamedTuple):
 
 
 def start_postures(model: Model) -> list[StartPosture]:
-    """The start of the scene, then all others that are found, the nearest first.
+    """Return the start posture of the scene, then all others that are found, the nearest first.
 
-    Others are looked for where constraint equations determine every joint at t = 0; their angles are within ±π. Of
-    those with the same names the nearest has them alone, as `chosen_start` takes it.
+    Others are sought where constraint equations determine every joint at t = 0; their angles are within ±π. Of
+    postures on one branch only the nearest, which `chosen_start` takes, keeps its `branch`; the others have {}.
     Raises `InputError` where the scene has no start.
     """
     start = undeformed_posture(model).q
@@ -77,7 +77,7 @@ def _posture(model: Model, q: Array, start: Array) -> StartPosture:
 
 
 def chosen_start(model: Model) -> StartPosture | None:
-    """The start on `initial.branch` nearest to the guess; None if the scene names no branch.
+    """The start posture on the scene's `initial.branch` nearest to the guess; None if the scene names no branch.
 
     Raises `InputError` if no start is on it.
     """
@@ -108,10 +108,10 @@ MEETING = 1e-6  # of the size of the robot: axes that miss each other by less me
 
 
 def branch_names(model: Model, q: Array) -> dict[str, Word]:
-    """The branch at q (n_q,), rad and m, by joint: configuration of shoulder, elbow and wrist of the tool's arm.
+    """The branch at q (n_q,), rad and m: "right" or "left" shoulder, "up" or "down" elbow, "flip" or "noflip" wrist.
 
-    The wrist is the fifth of six turning joints. An arm whose first axis is not parallel to the next two has a shoulder
-    and an elbow, one whose first two are parallel an elbow.
+    By joint of the tool's arm. The wrist is the fifth of six turning joints. An arm whose first axis is not parallel to
+    the next two has a shoulder and an elbow, one whose first two are parallel an elbow.
     """
     joints = _turning(model)
     axes = _lines(model, q, joints)[1]

@@ -1,8 +1,7 @@
 """Joints that leave the range which the scene gives them.
 
-Those of the tree are watched by the core while it integrates, between outputs, too. Others are looked at in outputs:
-joints at which loops are cut have no coordinate in the tree, and those of planar joints that lead backwards are no
-entries of the state. Of a motion that the core does not integrate all are looked at, at all times that are given.
+Coordinates of the tree are watched by the core while it integrates, between outputs, too. Others are looked at in
+outputs: those of joints at which loops are cut, and of planar joints that lead backwards, are no entries of the state.
 """
 
 from collections.abc import Iterator, Sequence
@@ -24,27 +23,27 @@ Seen = tuple[float, float, float | None]
 
 
 class Watched(NamedTuple):
-    """A coordinate with a limit that the core watches: `sign` times that with this index in the tree's v."""
+    """A coordinate of a joint with a limit that the C++ core watches, as `sign` times a coordinate of the tree."""
 
     joint: JointRecord
     number: int  # of the joint's coordinates
-    v: int
+    v: int  # number in v of the tree's coordinate
     sign: float
 
     @property
     def limits(self) -> tuple[float, float]:
-        """Limits of the tree's coordinate, for the core."""
+        """Lower and upper limit of the tree's coordinate, rad or m."""
         lowest, highest = sorted(self.sign * limit for limit in self.joint.position_limits[self.number])
         return lowest, highest
 
     def seen(self, other: Seen) -> Seen:
-        """The core's findings in terms of the joint's coordinate."""
+        """Turn least and largest value of the tree's coordinate, rad or m, into those of the joint's."""
         least, largest = sorted(self.sign * value + 0.0 for value in other[:2])
         return least, largest, other[2]
 
 
 def watched(tree: KinematicTree) -> list[Watched]:
-    """Coordinates that the core watches: none where joints have no limits."""
+    """Coordinates with limits that the core watches."""
     ways = []
     for node in tree.nodes:
         if _is_limited(node.joint) and not _is_sampled(node):
@@ -63,10 +62,10 @@ def watch_limits(scene: _core.TreeScene, tree: KinematicTree) -> None:
 
 
 def left_ranges(model: Model, ranges: Sequence[Seen] | None, times: Array, q: Array, v: Array) -> Iterator[str]:
-    """Yield a warning for each coordinate outside its position_limit: the first time, and the largest excess.
+    """Yield a warning for each coordinate outside its position_limit: the first time, and its range.
 
-    `ranges` is what the core has seen of `watched`, None of a motion without the core; the others are looked at in
-    outputs at `times` (T,), s: `q` (T, n_q), `v` (T, n_v), rad, m and s.
+    `ranges`: what the core found of each of `watched`; None where it did not integrate the motion. Other coordinates
+    are looked at in outputs at `times` (T,), s: `q` (T, n_q), `v` (T, n_v), rad, m and s.
     """
     of_core = zip(watched(model.tree), ranges, strict=True) if ranges is not None else ()
     seen = [(one.joint, one.number, one.seen(values)) for one, values in of_core]
@@ -95,9 +94,9 @@ def _is_sampled(node: Node) -> bool:
 def limited_coordinates(
     model: Model, times: Array, q: Array, v: Array, *, every: bool
 ) -> Iterator[tuple[JointRecord, int, Array]]:
-    """Yield coordinates (T,), rad or m, of joints with limits that the core does not watch, in the tree and at cuts.
+    """Yield joint, number of the coordinate, and values (T,), rad or m, of coordinates that the core does not watch.
 
-    `every`: of the tree all.
+    Motion q (T, n_q), v (T, n_v), SI units, at `times` (T,), s. With `every`, also those that the core watches.
     """
     for node in model.tree.nodes:
         if _is_limited(node.joint) and (every or _is_sampled(node)):

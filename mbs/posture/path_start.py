@@ -13,7 +13,7 @@ from .start import check_reach, undeformed_posture
 class PathStart:
     """A robot that follows its path, and its state at t = 0 with undeformed links."""
 
-    model: Model  # with rows for redundant freedoms, and with compliant gears where motors follow the path
+    model: Model  # with equations for redundant freedoms, and with compliant gears where motors follow the path
     state: State
     mobility: Mobility  # with rigid gears
     warnings: tuple[str, ...]

@@ -26,11 +26,11 @@ class Mobility:
     """Mobility of the rigid mechanism in a posture.
 
     Attributes:
-        freedom: degrees of freedom that joints and loops leave.
-        followed: how many of these the trajectories take.
-        ratio: smallest of largest singular value of the path's rows in these freedoms, lengths in sizes of the robot.
+        freedom: number of degrees of freedom that joints and loops leave.
+        followed: how many of these the trajectories prescribe.
+        ratio: smallest by largest singular value of the path's equations in these freedoms, lengths by the robot's.
         left: joints that still move with all trajectories prescribed.
-        loop_rank: how many rows of the loops are independent with rigid links.
+        loop_rank: rank of the loops' constraint equations.
     """
 
     freedom: int
@@ -41,17 +41,17 @@ class Mobility:
 
 
 def mobilities(model: Model, q: Array, times: Array, loop_rank: int = -1) -> list[_core.Mobility]:
-    """Return the mobility with rigid links and gears at q (T, n_q) and `times` (T,), s.
+    """Return the mobility with rigid links and gears at q (T, n_q), rad and m, and `times` (T,), s.
 
-    Links may be bent, by which constraints of loops that are redundant with straight ones seem to lock joints:
-    `loop_rank` is their rank with straight ones.
+    `loop_rank` is the rank of the loops' equations with straight links; where negative, that at q. Bent links raise
+    it, so that redundant equations seem to lock joints.
     """
     constraints, is_path = model.constraints, (~model.loop_rows).tolist()
     return constraints.core.mobilities(constraints.scene, times.tolist(), q, is_path, model.size, loop_rank)
 
 
 def singular_ratios(model: Model, q: Array, times: Array, rank: int) -> Array:
-    """Return ratios (T,) of smallest to largest of `rank` singular values of all rows: see `mobilities`."""
+    """Return ratios (T,), smallest to largest of `rank` singular values of all constraint equations at q (T, n_q)."""
     constraints, is_path = model.constraints, [False] * len(model.rows)
     motions = constraints.core.mobilities(constraints.scene, times.tolist(), q, is_path, model.size, rank)
     return np.array([at.loop_ratio for at in motions])
@@ -76,9 +76,9 @@ def _joints(model: Model, are: Booleans) -> tuple[str, ...]:
 
 
 def paths_by_bending(model: Model, q: Array) -> tuple[int, tuple[str, ...]]:
-    """How many path rows move coordinates that loops lock at q (n_q,), rad and m, with rigid links, and these joints.
+    """How many path equations move only joints that loops lock with rigid links at q (n_q,), rad and m; these joints.
 
-    0 of robots without flexible links: there nothing lets such rows move.
+    0 of robots without flexible links.
     """
     is_loop, now = model.loop_rows, np.zeros(1)
     if not is_loop.any() or not any(node.body.n_modes for node in model.tree.nodes):
@@ -91,9 +91,9 @@ def paths_by_bending(model: Model, q: Array) -> tuple[int, tuple[str, ...]]:
 
 
 def rank_of_redundant_loops(model: Model, q: Array, rows: Indices) -> int | None:
-    """The rank of the loops' constraints in `rows` if straight links, at q (n_q,), rad and m, make some redundant.
+    """The rank of loop equations with links straight at q (n_q,), rad and m, if some of those in `rows` are redundant.
 
-    Else None. Bent links raise it: joints seem to be locked that the links let move. So does a path by which they bend.
+    Else None. Each path equation that links follow only as they bend (`paths_by_bending`) lowers it by one.
     """
     count = int(np.count_nonzero(model.loop_rows[rows]))
     if not count:
@@ -103,7 +103,7 @@ def rank_of_redundant_loops(model: Model, q: Array, rows: Indices) -> int | None
 
 
 def shape_in_redundant_loops(model: Model, q: Array, rows: Indices) -> str:
-    """Why links in such loops, straight at q (n_q,), rad and m, cannot be given a shape; "" where there are none."""
+    """Why links, straight at q (n_q,), cannot be given a shape: equations `rows` of loops are redundant; else ""."""
     if rank_of_redundant_loops(model, q, rows) is None:
         return ""
     owners = quoted(dict.fromkeys(row.owner for row in model.rows if not row.is_trajectory))
@@ -114,15 +114,18 @@ def shape_in_redundant_loops(model: Model, q: Array, rows: Indices) -> str:
 
 
 def worst_posture(model: Model, times: Array, q: Array, loop_rank: int = -1) -> tuple[float, int]:
-    """Least ratio of `Mobility` at `times` (T,), s, and q (T, n_q), and its time; `loop_rank` as in `mobilities`."""
+    """Least ratio of `Mobility` at `times` (T,), s, and q (T, n_q), and number of this time.
+
+    `loop_rank` as in `mobilities`.
+    """
     ratios = [at.ratio for at in mobilities(model, q, times, loop_rank)]
     return min(ratios), int(np.argmin(ratios))
 
 
 def describe_posture(model: Model, ratio: float, t: float, q: Array, *, is_end: bool, loop_rank: int = -1) -> str:
-    """A message on the worst posture q (n_q,) of a path, at time t (s) with that ratio; "" if regular.
+    """A message on the worst posture q (n_q,) of a path at t (s) with `ratio` of `Mobility`; "" if regular.
 
-    Of one in which the run ends it is said to be singular. `loop_rank` as in `mobilities`.
+    `is_end`: the run ends there, in a singular posture. `loop_rank` as in `mobilities`.
     """
     if not ratio < NEARLY_SINGULAR:
         return ""
@@ -133,7 +136,7 @@ def describe_posture(model: Model, ratio: float, t: float, q: Array, *, is_end: 
 
 
 def describe_branches(model: Model, times: Array, q: Array, loop_rank: int) -> str:
-    """A message if loops pass a singular posture at `times` (T,) and q (T, n_q); "" if far from one.
+    """A message if loops pass a singular posture at `times` (T,), s, and q (T, n_q), rad and m; else "".
 
     `loop_rank` as in `mobilities`.
     """
@@ -149,7 +152,7 @@ def describe_branches(model: Model, times: Array, q: Array, loop_rank: int) -> s
 
 
 def describe_loops(model: Model, t: float, q: Array, v: Array) -> str:
-    """A message if loop or path equations become nearly dependent at q (n_q,), v (n_v,) and time t (s); else ""."""
+    """A message if loop or path equations become nearly dependent at q (n_q,), v (n_v,), t, rad, m and s; else ""."""
     loops = model.without_paths()
     before = loops.constraints.posture(model.tree.integrate(q, -BESIDE / max(float(np.abs(v).max()), 1e-300) * v), 0.0)
     if not loops.rows or before is None:
@@ -182,8 +185,8 @@ def describe_loops(model: Model, t: float, q: Array, v: Array) -> str:
 def check_path(model: Model, q: Array, end: float) -> Iterator[str]:
     """Yield warnings on freedoms that neither paths nor motors determine at q (n_q,), rad and m.
 
-    Raises `InputError` for more rows than the mechanism can follow, motors that do not fit, a singular posture, and a
-    path that jumps before `end` (s).
+    Raises `InputError` for more components than the mechanism can follow, a wrong number of motors, a singular posture,
+    and a path that jumps before `end` (s).
     """
     path, free = model.scene.path, mobility(model, q)
     bent, locked = paths_by_bending(model, q)
@@ -246,10 +249,10 @@ RESTING = 1e-6  # of the largest value, within the run: a path that moves less s
 
 
 def check_smooth(path: Path, targets: Iterable[tuple[str, TimeFunction]], end: float) -> None:
-    """Raise `InputError` for a target, with its label, that jumps in value or velocity between t = 0 and `end` (s).
+    """Raise `InputError` for one of `targets` (label, function) that jumps in value or velocity from t = 0 to `end`, s.
 
-    `path` is that of the scene. Accelerations may jump. What is looked into are the intervals that the trapezoidal rule
-    on the exact derivatives describes worst; a jump is what stays however far they are halved.
+    `path` is the scene's file. Accelerations may jump. The intervals that the trapezoidal rule on the exact
+    derivatives describes worst are halved; a jump stays.
     """
     for label, target in targets:
         for order, quantity in enumerate(("value", "velocity")):
@@ -290,7 +293,7 @@ def _jump(function: TimeFunction, end: float, order: int) -> tuple[float, float,
 
 
 def misfits(function: TimeFunction, times: Array, order: int) -> Array:
-    """Return how far changes of derivative `order` between `times` (T, …), s, are off the integral of the next one.
+    """Return how far changes of derivative `order` between `times` (T, …), s, differ from integrals of the next one.
 
     (T − 1, …) in the unit of that derivative, by the trapezoidal rule; 0 where not finite.
     """

@@ -15,7 +15,7 @@ from ..model.system import frame_share, turning_motors
 
 
 class Prescribed(NamedTuple):
-    """States q (T, n_q), v and a (T, n_v), multipliers (T, rows), and the forces M v̇ − Q (T, n_v) that they take."""
+    """States q (T, n_q), v, a (T, n_v), multipliers (T, equations), required forces M v̇ − Q (T, n_v); SI units."""
 
     q: Array
     v: Array
@@ -25,7 +25,7 @@ class Prescribed(NamedTuple):
 
 
 def following_motors(model: Model, q: Array | None = None) -> Model:
-    """The robot with the coordinates of its motors in place of its paths, kept as at q (n_q,) where that is given."""
+    """The robot with constraints on its motors' coordinates in place of paths: to stay as at q (n_q,), where given."""
     rows = [row for row in model.rows if not row.is_trajectory]
     for joint, coordinates in model.motors.items():
         node = model.driven(joint)
@@ -40,12 +40,11 @@ PrescribedMotion = _core.PlanarPrescribedMotion | _core.SpatialPrescribedMotion
 
 
 def prescribed_motion(model: Model, motion: PrescribedMotion, modes: Array, times: Array, near: Array) -> Prescribed:
-    """The motion at `times` (T,), s, for `modes` (3, T, n): p, ṗ, p̈, from postures near (T, n_q).
+    """The motion at `times` (T,), s, for `modes` (3, T, n): p, ṗ, p̈, m·√kg and s, from postures near (T, n_q).
 
-    From a single one, near the first, postures are found one after the other. The multipliers are those that go with
-    joints that move freely: what is left of the forces on the modes holds the shape.
-
-    Raises `SolveError` where no posture meets the rows.
+    From one posture, near the first, each is sought next to the one before. Multipliers balance the forces on joints,
+    which move freely; the forces on modes that are left hold the shape.
+    Raises `SolveError` where no posture meets the constraint equations.
     """
     states = motion.motion(times.tolist(), modes[0], modes[1], modes[2], near)
     is_met = np.isfinite(states.q).all(axis=1)
@@ -62,7 +61,7 @@ def left_slopes(
 ) -> tuple[Array, Array, Array]:
     """Derivatives M, D, K (T, n + motors, n), SI units, of residual modal forces and motor torques by p̈, ṗ and p.
 
-    At `times` (T,), s, with `modes` p, ṗ, p̈ (T, n), m·√kg and s, and postures near (T, n_q). Without motors: n rows.
+    At `times` (T,), s, with `modes` p, ṗ, p̈ (T, n), m·√kg and s, and postures near (T, n_q), rad and m.
     """
     at, n = times.tolist(), modes[0].shape[1]
     M, D, K = (x.reshape(len(times), -1, n) for x in motion.derivatives(at, *modes, near))

@@ -1,8 +1,7 @@
 """Freedom that paths leave to a robot, as six components do to seven joints: settled with rigid links.
 
-The motion of the joints along the path is found with undeformed links, by the criterion that the scene names. Of the
-joints those that tell the motion left free best then follow it, as joints that the scene prescribes do: with flexible
-links these and the path are followed exactly.
+The motion of the joints along the path is found with undeformed links, by the criterion that the scene names. The
+joints that determine the free motion best then follow it exactly, with flexible links, too.
 """
 
 from collections.abc import Iterable, Iterator
@@ -38,9 +37,9 @@ TELLS = 0.02  # share of a motion left free that joints must have at all times t
 
 
 def resolved(model: Model, end: float) -> Model:
-    """The robot with a row for each redundant freedom from 0 to `end` (s), by the scene's `redundancy`.
+    """The robot with a joint's motion from 0 to `end` (s) as equation for each redundant freedom.
 
-    Raises `InputError` where the criterion has nothing to resolve, `SolveError` where it leads nowhere.
+    By the scene's `redundancy`. Raises `InputError` where nothing is redundant, `SolveError` where no motion is found.
     """
     criterion = model.scene.redundancy
     if criterion is None or all(not row.is_trajectory for row in model.rows):

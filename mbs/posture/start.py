@@ -32,9 +32,9 @@ BEYOND = 1e-6  # of the reach: less is round-off
 
 
 def undeformed_posture(model: Model) -> State:
-    """The state with p = ṗ = 0 that meets all rows at t = 0, next to the guessed coordinates and rates.
+    """The state with p = ṗ = 0 that meets all constraint equations at t = 0, next to guessed coordinates and rates.
 
-    Raises `InputError` where none does: see `posture_from_elsewhere`.
+    Raises `InputError` where none does.
     """
     tree = model.tree
     guess = _with_slides(model, tree.at_rest(_numbers(model, model.scene.initial.joints, "joints")))
@@ -55,7 +55,7 @@ def undeformed_posture(model: Model) -> State:
 
 
 def rates_on_rows(model: Model, q: Array, v: Array, locked: Booleans | None = None) -> Array:
-    """Return v (n_v,) moved onto Ċ = 0 at q (n_q,) and t = 0 by the least change of joints not `locked` (n_v,)."""
+    """Return v (n_v,) with Ċ = 0 at q (n_q,), SI units, and t = 0 by the least change of joints not `locked` (n_v,)."""
     scales, now = model.joint_sizes if locked is None else np.where(locked, 0.0, model.joint_sizes), np.zeros(1)
     (C_v,), (C_dot,) = model.constraints.values(q[None], now)[1], model.constraints.rates(q[None], v[None], now)
     sizes = model.row_sizes
@@ -129,9 +129,9 @@ def _named(model: Model, table: Literal["joints", "joint_rates"]) -> Booleans:
 
 
 def displaced_joints(model: Model, start: State, joints: Container[str] | None = None) -> Iterator[str]:
-    """A warning where loops cannot be closed with all values of [initial], and joints, or any of `joints`, move.
+    """Yield a warning where loops do not close with all values of [initial], and joints begin away from these.
 
-    `start` is the undeformed robot.
+    `start` is the undeformed robot; where `joints` are given, only these count.
     """
     if not model.loop_rows.any():
         return
@@ -169,7 +169,7 @@ def _with_slides(model: Model, q: Array) -> Array:
 
 
 def relaxed_gears(model: Model, state: State) -> State:
-    """Return `state` with no compliant gear twisted, nor at a rate.
+    """Return `state` with compliant gears untwisted: twist and its rate 0.
 
     Motors move to their joints; where a trajectory prescribes the motor, its joint moves to it.
     """
@@ -220,7 +220,7 @@ def _guessed_rates(model: Model) -> Array:
 
 
 def out_of_reach(model: Model, times: Array) -> str:
-    """A message on the first path that leaves the reach of the links, at the first of `times` (T,), s; else ""."""
+    """Where the first path that is beyond the reach of the links at one of `times` (T,), s, is; else ""."""
     return next((f'trajectory "{name}" {how}' for name, how in _beyond(model, times)), "")
 
 
@@ -276,10 +276,10 @@ def _chain(model: Model, point: str) -> tuple[str, Array, float] | None:
 
 
 def posture_from_elsewhere(model: Model, guess: Array) -> Array:
-    """A posture (n_q,), rad and m, with undeformed links that meets all rows at t = 0; `guess` (n_q,) leads to none.
+    """A posture (n_q,), rad and m, with undeformed links that meets all constraint equations at t = 0.
 
-    Where a point follows a path and no joint has a guess, zero may be singular: the nearest to zero that works does.
-    Raises `InputError` else, with what may help.
+    For a `guess` (n_q,) that leads to none: where a point follows a path and [initial] names no joint, the nearest of
+    random guesses that leads to one takes its place. Else raises `InputError` with advice.
     """
     check_reach(model, 0.0)
     scene, constraints, times, (nodes, columns) = model.scene, model.constraints, np.zeros(1), turning_joints(model)
@@ -311,7 +311,7 @@ def posture_from_elsewhere(model: Model, guess: Array) -> Array:
 
 
 def turning_joints(model: Model) -> tuple[list[Node], Indices]:
-    """The joints of the tree that turn, and where their angles are in q."""
+    """The joints of the tree with angles, and the numbers of these in q."""
     tree, columns = model.tree, list[int]()
     turning = [node for node in tree.nodes if node.joint.name in tree.carried and "rad" in node.joint.units]
     for node in turning:
@@ -321,27 +321,27 @@ def turning_joints(model: Model) -> tuple[list[Node], Indices]:
 
 
 def random_angles(guess: Array, columns: Indices, count: int) -> Array:
-    """`count` postures (…, n_q) like `guess` (n_q,), with reproducible random angles, rad, in `columns`."""
+    """Postures (`count`, n_q) like `guess` (n_q,), with reproducible random angles, rad, in `columns`."""
     starts = np.tile(guess, (count, 1))
     starts[:, columns] = np.random.default_rng(0).uniform(-np.pi, np.pi, (count, len(columns)))
     return starts
 
 
 def regular_postures(model: Model, q: Array) -> Array:
-    """Postures (…, n_q), rad and m, near q (T, n_q) that satisfy all rows at t = 0 and are regular."""
+    """Regular postures (…, n_q), rad and m, near q (T, n_q) that satisfy all constraint equations at t = 0."""
     postures, is_met = model.constraints.postures(q, np.zeros(len(q)))
     postures = postures[is_met]
     return postures[are_regular(model, postures, np.zeros(len(postures)))]
 
 
 def are_regular(model: Model, q: Array, times: Array) -> Booleans:
-    """(T,) whether joints can follow all rows at `times` (T,), s, in postures q (T, n_q), rad and m."""
+    """(T,) whether postures q (T, n_q), rad and m, are far from singular ones at `times` (T,), s."""
     rank = min(len(model.rows), int(model.tree.joint_columns.sum()))
     return np.asarray(singular_ratios(model, q, times, rank) > REGULAR)
 
 
 def as_guess(nodes: Sequence[Node], q: Array) -> str:
-    """The coordinates of joints at q (n_q,), rad or m, as a line of [initial] has them: "joints = { … }"."""
+    """The line of [initial] with the coordinates of `nodes` at q (n_q,), rad and m: "joints = { … }"."""
     joints = {}
     for node in nodes:
         numbers = [
@@ -353,9 +353,9 @@ def as_guess(nodes: Sequence[Node], q: Array) -> str:
 
 
 def turned_guesses(scene: MechanismKeys) -> list[str]:
-    """Guesses of angles beyond a whole turn, which are degrees as a rule; a text each.
+    """A message on each guessed angle of the scene beyond a whole turn: most are degrees.
 
-    A trajectory of the joint's own coordinate says in which turn it begins.
+    Joints whose own coordinate has a trajectory, which says the turn, are left out.
     """
     followed = {path.coordinate_of for path in scene.trajectory}
     units = {joint.name: joint.guess_units or joint.units for joint in scene.joint}

@@ -27,7 +27,10 @@ BEYOND = 1e3  # rad: postures beyond limits of joints come after all others
 
 @struct
 class GridAxis:
-    """A joint's coordinate, "x", "y" or "z" of the point, or "turn", of its body; `unit` is "rad" or "m"."""
+    """Axis of a grid: coordinate of a joint (its `name`), "x", "y", "z" of a point, or "turn" of its body.
+
+    `values` (n,) are in `unit`, "rad" or "m"; `is_place` of x, y, z.
+    """
 
     name: str
     values: Array
@@ -38,7 +41,7 @@ class GridAxis:
 class Postures(NamedTuple):
     """Undeformed postures, rad and m, one for each point of the grid, the last axis fastest.
 
-    q (P, n_q) of the robot with rigid gears; `reached` (P,) whether there is one on the branch of the start; `within`
+    q (P, n_q) of the robot with rigid gears; `reached` (P,) whether q is found, on the branch of the start; `within`
     (P,) whether it keeps the limits of the joints.
     """
 
@@ -52,11 +55,11 @@ def grid_postures(
 ) -> Postures:
     """Postures over the grid: each by Newton from a neighbor that is solved, beginning next to the start of the scene.
 
-    Joints that the grid leaves open move as little as they can from the neighbor. `point` is where the model has it.
-    With `keeps_orientation` its body keeps the orientation that it has at the start. With an axis `TURN` it turns from
-    there about `turned_about` (3,), in the axes of a tool or else global ones, and stays at the x, y and z of the start
-    that the grid leaves open.
-    Raises `InputError` for axes that the robot has not, or that ask for more than it can do.
+    Joints that the grid leaves open move as little as they can from the neighbor. `point` is "BODY.POINT" of the model.
+    With `keeps_orientation` its body keeps its orientation at the start. With an axis "turn" it turns from there about
+    the unit vector `turned_about` (3,), in axes of a tool or else global ones, and keeps those of x, y and z of the
+    start that are no axes of the grid.
+    Raises `InputError` for a joint with several coordinates.
     """
     start, shape = undeformed_posture(model).q, tuple(len(axis.values) for axis in axes)
     values = np.stack(np.meshgrid(*(axis.values for axis in axes), indexing="ij"), axis=-1).reshape(-1, len(axes))
