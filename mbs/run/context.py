@@ -19,11 +19,11 @@ Point = TypeVar("Point", str, str | None)
 
 
 class PatchedLink(Protocol):
-    """What voltages of the k patches of one link do to the bodies that carry them: the link, or its pieces."""
+    """A link with k patches, for their voltages: the bodies that carry them are the link itself, or its pieces."""
 
     @property
     def per_volt(self) -> Mapping[str, Array]:
-        """Modal forces per volt (n, k), N/(√kg·V), by body."""
+        """Modal forces on n modes per volt (n, k), N/(√kg·V), by body."""
 
     @property
     def amplifiers(self) -> Amplifiers:
@@ -39,14 +39,14 @@ class PatchedLink(Protocol):
 
     @property
     def to_reached(self) -> Mapping[str, Array]:
-        """Matrices (m, n), by body, from modal forces on the modes of the file to those of `allocation`."""
+        """Matrices (m, n), by body, from forces on the n modes of the file to the m modal forces of `allocation`."""
 
     def allocation(self, *, limited: bool) -> _core.Allocation:
         """Return the map from modal forces to voltages, with limits of the patches or without."""
 
 
 class PointsOfBody(Protocol):
-    """Points of one body for components of force."""
+    """Points of one body for c components of force along its axes."""
 
     def of_core(self) -> tuple[Array, Array, Array, Array]:
         """Return arrays for `_core.point_reader`: directions and positions (3, c), Φ (3 c, n), scale (6 + n)."""
@@ -58,12 +58,12 @@ ForcesAtPoints = Callable[[Run], Mapping[str, Array]]
 
 @struct
 class WholeLinks:
-    """The robot with whole links, as scenes and controllers name it, of a model with links in pieces."""
+    """The robot with whole links, as scenes and controllers name it, where the model has links in pieces."""
 
     model: Model  # the robot with one body for each link
     divided: Mapping[str, DividedLink]  # the links in pieces by name
-    places: Mapping[str, str]  # which point of which piece "BODY.POINT" of such a link is
-    # an outcome of the pieces as one of the links; `InputError` where their joints lack coordinates
+    places: Mapping[str, str]  # from "LINK.POINT" of such a link to "PIECE.POINT" of the model
+    # turns a run of the model into one of the links; `InputError` where joints between pieces lack coordinates
     as_links: Callable[[Run], Run]
 
 
@@ -72,19 +72,19 @@ class Context:
     """Data from which the run of an analysis starts."""
 
     _: KW_ONLY
-    progress: Progress  # see `drive.Progress`
+    progress: Progress  # called with the time reached, s; False stops the run
     model: Model  # the robot, with the constraint equations of all joints that close loops and of all trajectories
     outcomes: Mapping[str, Run]  # of the analyses before, by name
-    path: PathStart | None = None  # of analyses that start on it
-    is_replayed: bool = False  # whether a later analysis takes its actuation
-    earlier: Run | None = None  # an earlier run of the same analysis, to go on with; None from the start
-    patches: Mapping[str, PatchedLink] = field(default_factory=dict)  # of links by body
+    path: PathStart | None = None  # of analyses that start on a path
+    is_replayed: bool = False  # whether a later analysis applies the forces that are found
+    earlier: Run | None = None  # a run of the same analysis that goes on; None from the start
+    patches: Mapping[str, PatchedLink] = field(default_factory=dict)  # by link
     points: Mapping[str, PointsOfBody] = field(default_factory=dict)  # actuation points by body
-    at_points: ForcesAtPoints = lambda _: {}  # what driving forces are there
-    start: State | None = None  # of a replay, in place of where the run that it replays starts
-    whole: WholeLinks | None = None  # the links, where `model` has pieces of some
+    at_points: ForcesAtPoints = lambda _: {}  # driving forces at these
+    start: State | None = None  # of a replay, in place of the start of the replayed run
+    whole: WholeLinks | None = None  # whole links, where `model` has pieces of some
 
 
 def place_of(whole: WholeLinks | None, point: Point) -> Point:
-    """Return the point of the model for a point of the scene; they differ on links in pieces."""
+    """Return the model's "BODY.POINT" for that of the scene; they differ on links in pieces."""
     return point if whole is None or point is None else whole.places.get(point, point)

@@ -55,15 +55,15 @@ POSTURES = 2001  # outputs whose postures are looked at where the core does not 
 
 @struct
 class Control:
-    """Commands to motors and patches from sample to sample; SI units.
+    """Sampled commands of a controller to motors, N·m or N, and patches, V.
 
     Attributes:
-        commands: what a unit of each does.
-        first: (inputs,) before those of the first sample act.
+        commands: generalized forces of a unit of each command.
+        first: (inputs,) commands before those of the first sample act.
         times: (K,) s, of the samples; the commands of each act `delay` (s) later.
-        controller: commands (inputs,) from sample number, time and what was read: q (n_q,), v (n_v,), a (n_v,) in one.
-        held: commands (T, inputs) that have acted up to times (T,), s, after a run.
-        instant: s, before and after which commands are read where they change.
+        controller: commands (inputs,) by sample number, time (s) and state: q (n_q,), v, a (n_v,) in one array, SI.
+        held: after a run, the commands (T, inputs) that act at times (T,), s.
+        instant: s, before and after a change of commands at which they are recorded.
     """
 
     commands: tuple[Command, ...]
@@ -89,12 +89,12 @@ def drive_robot(
     is_recorded: bool = False,
     undeformed: Array | None = None,
 ) -> Run:
-    """The run of an integration from `start`, with outputs at `times` (T,), s; by default those of the analysis.
+    """Integrate from `start` and return the run, with outputs at `times` (T,), s; by default those of the analysis.
 
-    Sampled `control` and `drives` act beside the loads of the scene. The rows of `model` hold. It ends early where
-    `progress` says so, and in a posture in which the joints cannot follow the path, with a warning. It goes on with an
-    `earlier` run of the same analysis. `is_recorded`: with its steps, for a replay.
-    `undeformed` (n_q,): posture with straight links where a path begins.
+    Sampled `control` and `drives` act beside the loads of the scene, under the constraint equations of `model`. The run
+    ends early where `progress` returns False, or, with a warning, where the joints cannot follow the path. It goes on
+    with an `earlier` run of the same analysis. `is_recorded`: steps are kept for a replay.
+    `undeformed` (n_q,), rad and m: posture with straight links where a path begins.
     """
     this = _Integration(model, analysis, analysis.times if times is None else times, drives, control)
     this.begin(start, earlier, undeformed, is_recorded=is_recorded)
@@ -381,10 +381,10 @@ FAR_BENT = 0.5  # of a link's radius of gyration, in the mean
 
 
 def find_cause(system: MultibodySystem, analysis: IntegratedAnalysis, choice: Choice, run: _core.TreeRun) -> str:
-    """A sentence with advice, the likely causes of a failure, the more certain first; empty where nothing is found.
+    """A sentence with the likely cause of a failed `run`, and advice; "" where none is found.
 
-    A target that is not a number, a link bent too far, a load that jumps, friction, a singular posture of loops; where
-    steps became too short, the integrator.
+    Looked for, in this order: a target that is not a number, a link bent too far, a load that jumps, friction, a
+    singular posture of loops; where steps became too short, the integrator.
     """
     t, at = run.time_reached, State(*np.split(np.array(run.last), [system.model.tree.n_q]))
 
@@ -449,7 +449,7 @@ def _loads(system: MultibodySystem) -> Iterator[tuple[str, TimeFunction]]:
 def load_jump(loads: Iterable[tuple[str, TimeFunction]], t: float) -> str:
     """Return which labelled load jumps at t (s), or has no finite value from there on; else "".
 
-    Functions of Python may have values alone: the changes just before and just after t tell what is no jump.
+    Values alone are compared, as functions of Python may have no derivatives: changes just before, at and after t.
     """
     dt = 1e-9 * max(t, 1e-9)
     for label, size in loads:

@@ -1,9 +1,7 @@
 """Compliant gears: motor torques that produce, through them, a motion found with rigid gears. SI units.
 
-Inverse analyses and equilibria take gears for rigid: their motion is that of the links, and their rotors turn with
-them. With the rigid rotor's angle ψ = N γ + α_a a gear transmits τ_s = τ − J N ψ̈ (Spong 1987). The twist
-δ = θ_m − γ follows from k(δ) + c δ̇ = τ_s as a quintic spline through the outputs, and the motor's torque is
-τ_s + J N (ψ̈ + N δ̈).
+Inverse analyses and equilibria take gears for rigid. Twists δ = θ_m − γ, as quintic splines through the outputs, and
+torques follow from their motion by docs/theory.md, (26) and (27).
 """
 
 from __future__ import annotations
@@ -34,28 +32,27 @@ CONTRACTS = 0.5  # of one change the next one at most, where rotors on outer bod
 
 
 def supplied_in(run: Run) -> Array:
-    """Return generalized forces (T, n_v), N·m or N, modal ones too, that paths or a prescribed shape require."""
+    """Return generalized forces (T, n_v), N·m, N and, on modes, N/√kg, that paths or a prescribed shape require."""
     if run.required is not None:
         return run.required
     return path_forces(run.model, run.time, run.q, run.multipliers)
 
 
 class Supplied(NamedTuple):
-    """Forces of motors and modes in a motion of the links; see `supplied_through_gears`."""
+    """Forces of motors and on modes that a motion of the links requires, through compliant gears."""
 
     forces: MotorForces  # τ, of motors in front of compliant gears, and F_p
     gears: Mapping[str, GearMotion]  # by joint with such a gear
 
 
 def supplied_through_gears(run: Run) -> Supplied:
-    """Return motor and modal forces of a run.
+    """Return motor and modal forces of a run, with the motion of its compliant gears.
 
-    Compliant gears let their rotors turn by N δ more. Then the rotor needs J N² δ̈ of its motor, and
-    the body that carries it, which turns with Ω_a, the moment J N (δ̈ z + δ̇ Ω_a × z): the rate of J N δ̇ z. That is
-    shared among motors and modes as all else. Moments in front of one gear contain what others add: all follow again,
-    gear by gear inwards, and until they repeat. Where the run knows twists and torques, nothing else counts.
+    Twists δ add moments on rotors and on the bodies that carry them (docs/theory.md, (26), (27)), which motors and
+    modes supply. Moments in front of a gear contain those of other gears: all are found anew until they repeat. Twists
+    and torques that the run knows are taken from it.
 
-    Raises `InputError` for such a joint without a motor, or with a load.
+    Raises `InputError` for a compliant gear without a motor, or with a load on its joint.
     """
     model, time, twists = run.model, run.time, run.twists
     compliant, wanted = with_compliance(model), supplied_in(run)
@@ -108,9 +105,9 @@ class MotorCoordinates(NamedTuple):
     """Motion in the coordinates of a robot with compliant gears.
 
     Attributes:
-        q, v, a: (T, n_q), (T, n_v), (T, n_v).
-        gears: by joint, those that are rigid in the motion; none where they are compliant in it, too.
-        moments: (T, k) by joint, of all motors where gears are rigid in the motion.
+        q, v, a: (T, n_q), (T, n_v), (T, n_v), SI units.
+        gears: by joint, where the run has them rigid; {} where they are compliant in the run, too.
+        moments: (T, k) N·m or N, by joint, of all motors, in the same case.
     """
 
     q: Array
@@ -123,7 +120,7 @@ class MotorCoordinates(NamedTuple):
 def with_motor_coordinates(run: Run, model: Model) -> MotorCoordinates:
     """Return the motion of `run` in coordinates of `model`, its motors advanced by the twist of compliant gears.
 
-    Raises `InputError` where motors turn frames and modes tilt the joint's axis: no angle goes with their moments.
+    Raises `InputError` where motors turn frames and modes tilt the joint's axis: no angle belongs to their moments.
     """
     if not model.tree.gears or run.model.tree.gears:
         return MotorCoordinates(run.q, run.v, run.a, {}, {})
@@ -139,9 +136,9 @@ def with_motor_coordinates(run: Run, model: Model) -> MotorCoordinates:
 
 
 def with_motors(model: Model, rigid: States, gears: Mapping[str, GearMotion]) -> KnownStates:
-    """Return states of `model`, which has compliant gears, from those with rigid ones and the twists of `gears`.
+    """Return states of `model`, which has compliant gears, from `rigid` ones and the twists of `gears`, by joint.
 
-    Without any `gears` motors are as far as their joints.
+    Motors of joints not in `gears` are untwisted.
     """
     known = [(gear.joint, gears.get(gear.joint.joint.name)) for gear in model.tree.gears]
     motors = np.array([_along(node, rigid) + (0.0 if of is None else of.twist) for node, of in known])
@@ -167,9 +164,10 @@ class GearSpring(NamedTuple):
 def gear_motion(
     spring: GearSpring, time: Array, tau: Array, rotor: Array, gamma: Array, curve: GearCurve | None = None
 ) -> GearMotion:
-    """Return the motion of a gear from `tau` (T,), N·m, with a rigid gear, of which its rotor takes `rotor` (T,), N·m.
+    """Return the motion of a gear from the motor torque `tau` (T,), N·m, with a rigid gear.
 
-    `gamma` (T, 3): the joint's coordinate, rad, its rate and acceleration. `curve`: δ(t), τ(t), where they are known.
+    `rotor` (T,), N·m: the part of it that accelerates the rotor; `gamma` (T, 3): the joint's coordinate, rad, its rate
+    and acceleration; `curve`: δ(t), τ(t), where they are known.
     Raises `InputError` if damping delays the twist so much that torques do not determine it.
     """
     lasts, longest = spring.damping / min(spring.spring.slopes), SLOWEST * (time[-1] - time[0])

@@ -25,7 +25,7 @@ METHODS = {name: getattr(_core.MethodKind, name.replace("-", "_")) for name in N
 
 
 class Rule(NamedTuple):
-    """What steps of DOP853 and Radau IIA reach and cost, measured in runs of tests/campaigns/choice.py.
+    """Size and cost of steps of DOP853 and Radau IIA, measured in runs of tests/campaigns/choice.py.
 
     DOPRI5 is never faster by more than clocks scatter: undamped, its steps have to be five times as short as those of
     DOP853 (it is stable up to 1.0), damped nearly three.
@@ -51,7 +51,7 @@ class Rule(NamedTuple):
     last_resort: float = 100.0
 
     def cost_of_radau(self, coordinates: int, replay: float) -> float:
-        """Cost of a Radau step in DOP853 steps; `replay`: further evaluations at each time, of an earlier motion."""
+        """Cost of a Radau step in DOP853 steps; `replay`: evaluations of a replayed motion per evaluation."""
         one = 1.0 + replay
         return (self.of_radau * one + self.of_algebra * coordinates) / (self.of_dop853 * one)
 
@@ -69,7 +69,7 @@ CHANGED, IN_ALL = " from t = ", "; changed "  # in reasons
 
 
 class Contender(NamedTuple):
-    """Integrator considered for a run: cost of a step, and expected progress, s per cost."""
+    """Integrator considered for a run: cost of a step in DOP853 steps, and expected progress, s per cost."""
 
     name: str
     cost: float = 1.0
@@ -79,8 +79,8 @@ class Contender(NamedTuple):
 class Choice(NamedTuple):
     """An integrator by its name in scenes, and why it was chosen.
 
-    Of two `candidates` the second takes over during the run where it turns out faster, and the first again. The name
-    is then that of the last one "after" the other.
+    Of two `candidates` the second takes over during the run where it turns out faster, and so back. The name is then
+    "LAST after OTHER".
     """
 
     name: str
@@ -89,12 +89,12 @@ class Choice(NamedTuple):
 
     @property
     def in_words(self) -> str:
-        """The methods in the order of the last change."""
+        """The name, after a change during the run as "OTHER, then LAST"."""
         last, _, before = self.name.partition(AFTER)
         return f"{before}, then {last}" if before else last
 
     def changed_in(self, run: _core.TreeRun) -> Choice:
-        """Return the choice with any change during `run`, with time and reason."""
+        """Return the choice with the changes of integrators during `run` in its name and reason."""
         if not run.changes:
             return self
         names = {kind: name for name, kind in METHODS.items()}
@@ -117,7 +117,7 @@ NOT_INTEGRATED = Choice("none", "nothing to integrate")
 def without_choosing(frequency: float, duration: float, replay: float, cost: float) -> Choice | None:
     """DOP853 for a run so short that choosing takes a notable part of it; None for others.
 
-    `frequency` rad/s, about the highest; `duration` s; `replay` as in `Rule.cost_of_radau`, whose result is `cost`.
+    `frequency` rad/s, about the highest; `duration` s; `cost` of a Radau step, and `replay`: see `Rule.cost_of_radau`.
     """
     steps = max(duration * frequency / RULE.stable, 1.0)
     if steps * RULE.of_dop853 * (1.0 + replay) > RULE.short:
@@ -132,9 +132,9 @@ def faster_of(
 ) -> Choice:
     """DOP853 or Radau IIA, whichever is expected to be faster, with the other to take over where it is not.
 
-    `frequency` (n,) rad/s, ascending, and `damping_ratio` (n,) of what vibrates; `excited` (n,) the relative size with
-    which each rings from the start on. No step goes beyond one of the outputs at `times` (T,), s. Radau has to find its
-    step `starts` times; `cost` of a step of it, in DOP853's.
+    `frequency` (n,) rad/s, ascending, and `damping_ratio` (n,) of n vibrations; `excited` (n,) their initial sizes,
+    relative to elastic forces. No step goes beyond an output at `times` (T,), s. Radau has to find its step size
+    `starts` times; its steps have a `cost` in DOP853 steps.
     """
     # damped more than critically a vibration falls faster than it would swing
     top = (frequency * np.maximum(1.0, 2 * damping_ratio)).max()
@@ -154,10 +154,10 @@ def faster_of(
 
 
 def beyond_round_off(tolerance: float, run: _core.TreeRun, of_gears: float) -> str:
-    """A sentence where round-off of `run`, and of its gears, needs a larger tolerance; else "".
+    """A warning where relative round-off of `run`, or `of_gears`, exceeds the tolerance; else "".
 
-    It adds the errors that the core has found of its steps. Where equations hardly differ they determine forces less
-    well: with r the least ratio of postures (`describe_posture`), to double precision over r².
+    Near singular postures, constraint equations determine forces only to double precision over r², where r is the
+    least ratio of singular values of postures.
     """
     of_posture = float(np.finfo(float).eps) / run.least_ratio**2 if run.least_ratio > 0.0 else 0.0
     if not (round_off := max(run.rounding, of_posture, of_gears)) > tolerance:
@@ -176,7 +176,7 @@ def beyond_round_off(tolerance: float, run: _core.TreeRun, of_gears: float) -> s
 
 
 def unmet(choice: Choice, run: _core.TreeRun) -> str:
-    """Return what the integrator found if steps became too short without a cause in loads or positions."""
+    """Return a sentence on the last steps of a `run` in which they became too short, with advice."""
     if run.last_step == 0:
         return (
             "the first step would be too short to change the time: accelerations or frequencies are that large;"
@@ -209,9 +209,9 @@ TOO_STIFF = 1e6  # rates of friction in a run above which explicit steps, a few 
 
 
 def integrator_of(model: Model, name: str) -> str:
-    """Resolve the name of an integrator in a scene to a method, without switching during the run.
+    """Return the integrator `name` of a scene, or for "auto" one for the whole run.
 
-    "auto" is Radau where dry friction acts on links with modes: near rest it is a damper so stiff for the light ends of
+    That is Radau where dry friction acts on links with modes: near rest it is a damper so stiff for the light ends of
     links that explicit steps take nanoseconds; else DOP853.
     """
     if name != "auto":
@@ -224,7 +224,7 @@ def choose_integrator(
 ) -> Choice:
     """The integrator for an analysis from `start` with outputs at `times` (T,), s.
 
-    Where a controller `is_sampled`, every sample starts anew and nothing takes over.
+    With a controller (`is_sampled`) steps start anew at each sample, and no other integrator takes over.
     """
     model = system.model
     if analysis.integrator != "auto":
@@ -259,9 +259,9 @@ def choose_integrator(
 
 
 def fastest_friction(system: MultibodySystem, at: State) -> tuple[float, str]:
-    """Rate (1/s) at which friction brings a joint to rest, in the state `at`, at most; and which: 0 without friction.
+    """Largest rate (1/s) at which friction brings a joint to rest in the state `at`, and the joint's label.
 
-    With D the slopes of friction at zero rates, the largest eigenvalue of M⁻¹ D, under what rows hold.
+    The largest eigenvalue of M⁻¹ D under the constraints, D the slopes of friction at zero rates; 0 without friction.
     """
     model, nothing = system.model, np.zeros(system.model.tree.n_v)
     D = np.diag(tree_resistance_slope(model.tree, nothing[None])[0]) + model.along_cut.damping(at.q)

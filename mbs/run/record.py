@@ -46,8 +46,8 @@ ADVICE = {
 class Statistics:
     """Statistics of a run; `cause` is the reason of an early end at `time_reached`, s.
 
-    `warnings` are on what is left open. `step_ends` (N,), in s, with which the run can be repeated, if it was asked for
-    them; see `field_types.Steps`.
+    `rejected` steps are not in `steps`; `evaluations` are of the equations of motion. `step_ends` (N,), s, of a run
+    that keeps its steps repeat it.
     """
 
     status: str = "completed"
@@ -71,7 +71,7 @@ class Statistics:
 
 @struct
 class Continuation:
-    """State from which an integration resumes, its recorded steps, and states between outputs."""
+    """State from which an integration resumes, its recorded steps, and states between outputs (`samples`)."""
 
     checkpoint: _core.TreeCheckpoint
     recording: _core.Recording | None = None
@@ -79,7 +79,7 @@ class Continuation:
 
 
 class GearCurve(NamedTuple):
-    """The twist δ(t) of a compliant gear, rad, and the torque of its motor behind it, N·m, where that is known too."""
+    """The twist δ(t) of a compliant gear, rad, and where it is known the torque of the motor at its output, N·m."""
 
     twist: BSpline | PPoly
     torque: PPoly | None = None
@@ -90,12 +90,12 @@ class GearMotion:
     """Motion of a compliant gear in an inverse analysis, one row per output.
 
     Attributes:
-        gear_moment: (T,) τ_s = k (θ_m − γ) + c (θ̇_m − γ̇), N·m: what the gear does to the second body.
-        angle, rate, acceleration: (T,) of the motor behind its gear, θ_m, rad.
-        moment: (T,) τ_s + J N ψ̈, N·m, of the motor, behind its gear.
+        gear_moment: (T,) τ_s = k(δ) + c δ̇, N·m, of the gear on the joint's second body.
+        angle, rate, acceleration: (T,) θ_m of the motor at the gear's output, rad, rad/s, rad/s².
+        moment: (T,) motor torque at the gear's output, N·m: τ_s and that which accelerates the rotor.
         unresolved: part of the largest moment by which it changes when only every second output is known.
-        twist: (T, 3) δ = θ_m − γ, rad, and its derivatives.
-        curve: δ(t) between outputs; None where there are too few.
+        twist: (T, 3) δ = θ_m − γ, rad, γ the joint's coordinate, with its two derivatives by s.
+        curve: δ(t) between outputs; None where outputs are too few.
     """
 
     gear_moment: Array
@@ -109,7 +109,7 @@ class GearMotion:
 
 
 class Details:
-    """Findings of one kind of analysis beyond the motion; this base class for kinds without any."""
+    """Findings of one kind of analysis beyond the motion; the base class, for kinds without any."""
 
     # pre_actuation, post_actuation: s for which motors act before and after the path
     pre_actuation: float = 0.0
@@ -120,13 +120,13 @@ class Details:
 
 
 class Prescription(NamedTuple):
-    """A motion of which the modes are functions of time.
+    """A motion whose modal coordinates are functions of time.
 
     Attributes:
-        motion: makes its equations, each time new ones.
-        shape: p(t) of each body.
-        near: (n_q,) a posture near the first.
-        voltages: V(t) (k,) by body, where the analysis itself finds them.
+        motion: makes new equations of it.
+        shape: p(t) of each body, m·√kg.
+        near: (n_q,) a posture near the first, rad and m.
+        voltages: V(t) (k,) by body, V, where the analysis itself finds them.
         breaks: s, between pieces of p(t), where p̈ jumps.
     """
 
@@ -146,17 +146,16 @@ class Run:
         time: (T,) s.
         q, v, a: (T, n_q), (T, n_v), (T, n_v) of the model's tree.
         multipliers: (T, constraint equations).
-        required: (T, n_v) generalized forces that a prescribed shape takes; None where those of the paths are all.
-        commanded: (T, k) moments by joint that act along joints, N·m or N: what a controller commands, or a replay
-            applies.
+        required: (T, n_v) generalized forces of a prescribed shape; None where `multipliers` have all forces.
+        commanded: (T, k) by joint, N·m or N along its coordinates, of a controller or a replay.
         voltages: (T, k) V by body, of patches where the analysis itself finds them.
         applied: forces on points beside the loads of the scene.
         is_at_rest: whether targets stand still, as in an equilibrium.
         twists: of compliant gears by joint, where they are known between outputs.
-        links: the links in pieces by name, as which the pieces are read.
-        details: what only its kind finds.
-        prescribed: what moves it, where that is known without steps.
-        look_closer: makes the same with times between its outputs; None where nothing is between.
+        links: by name, links whose pieces are bodies of `model`.
+        details: findings of its kind of analysis.
+        prescribed: its motion as functions of time, where no steps integrate it.
+        look_closer: makes a run with outputs also between those of this one; None where nothing is between.
     """
 
     _: KW_ONLY
@@ -197,11 +196,11 @@ class Run:
 
     @property
     def closer(self) -> Run:
-        """The run at its outputs and between: see `samples`. Itself where nothing is between."""
+        """The run at its outputs and at times between, which show peaks; itself where nothing is between."""
         return self if self.look_closer is None else self.look_closer()
 
     def with_look(self, at: Callable[[Array], Run]) -> Self:
-        """Return a run that can be sampled more closely along paths, by `at` for any times (T,), s."""
+        """Return the run with `look_closer` along its paths by `at`, which makes a run at any times (T,), s."""
 
         @cache
         def look_closer() -> Run:
@@ -231,7 +230,7 @@ class Run:
 
     @property
     def arithmetic(self) -> np.errstate[Any]:
-        """Context that ignores overflow where a run ended early or diverges: what follows from it may be infinite."""
+        """Context that ignores overflow where a run ended early or diverges: its results may be infinite."""
         is_calm = self.status == "completed" and np.abs(self.v).max(initial=0.0) < HUGE
         return np.errstate() if is_calm else np.errstate(over="ignore", invalid="ignore")
 
@@ -245,11 +244,11 @@ class Run:
             )
 
     def at(self, rows: slice | Sequence[int] | Indices) -> Self:
-        """Return these outputs alone."""
+        """Return the run with the outputs of numbers `rows` alone."""
         return self._each(lambda x: x[rows])
 
     def with_rows_of(self, other: Run, order: Indices) -> Self:
-        """Return the run with rows of `other`, at other times of the same motion, appended and reordered."""
+        """Return the run with outputs of `other`, at other times of the same motion, appended, then put in `order`."""
         return self._each(lambda x, y: np.concatenate([x, y])[order], other)
 
     def after(self, earlier: Run) -> Self:

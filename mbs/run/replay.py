@@ -43,8 +43,8 @@ def replay_times(source: Run, analysis: TimedAnalysis) -> Array:
 def supplied(run: Run, most: Array, patches: Mapping[str, PatchedLink], *, limited: bool) -> _core.ForceSource:
     """Return the forces that `run` found, for the core to apply: of motors, N·m or N, then voltages of `patches`, V.
 
-    Motors, in the order of `Model.motors`, act on second sides with at most `most` (motors,); `limited`: voltages stay
-    within the ranges of amplifiers.
+    Motors, in the order of `Model.motors`, act on the joints' second bodies with at most `most` (motors,), N·m or N.
+    `limited`: voltages stay within the ranges of amplifiers.
     """
     if run.prescribed is not None and run.prescribed.voltages:
         torques = _found(run, lambda driven: _core.actuator_reader(driven, most, []))
@@ -68,7 +68,10 @@ def _reached(model: Model, to_reached: Mapping[str, Array]) -> tuple[int, Array]
 
 
 def functions_within(curve: PPoly, least: Array | float = -np.inf, most: Array | float = np.inf) -> list[TimeFunction]:
-    """Functions of time of a curve (k,), which rest outside it; linear in parts of its pieces where limits cut it."""
+    """The k components of a `curve` as functions of time, constant before and after it.
+
+    Cut to `least` … `most` in the curve's unit; linear in parts of its pieces where these limits act.
+    """
     parts = np.linspace(0.0, 1.0, 1 if len(curve.c) == 2 else PARTS, endpoint=False)
     times = np.append((curve.x[:-1, None] + np.diff(curve.x)[:, None] * parts).ravel(), curve.x[-1])
     values = curve(times)
@@ -82,9 +85,10 @@ def functions_within(curve: PPoly, least: Array | float = -np.inf, most: Array |
 
 
 class OfPaths(NamedTuple):
-    """Forces that hold paths: numbers along the coordinates of joints, and at points by component.
+    """Constraint forces of paths, N·m and N: `source` has `total` of them.
 
-    There are `total` numbers; those at points that no component has are zero.
+    `joints`: their numbers along coordinates of joints; `points`: along global axes at "BODY.POINT", by component.
+    Forces at points in no component are zero.
     """
 
     source: _core.ForceSource
@@ -94,7 +98,7 @@ class OfPaths(NamedTuple):
 
 
 def path_numbers(run: Run) -> OfPaths:
-    """Forces on the points of paths, about there, and along the coordinates of joints that follow one."""
+    """Constraint forces of the paths of `run`: on points, moments about these, and along joint coordinates."""
     model = run.model
     rows = [(k, row) for k, row in enumerate(model.rows) if row.is_trajectory]
     along = [(k, row) for k, row in rows if row.kind == "coordinate"]
@@ -135,7 +139,7 @@ def _sides(model: Model, row: ConstraintRow) -> Iterator[tuple[str, float]]:
 
 
 def point_numbers(run: Run, chosen: Mapping[str, PointsOfBody]) -> _core.ForceSource:
-    """Driving forces at the actuation points, global axes: three numbers of each component."""
+    """Driving forces at actuation points `chosen` by body, N, global axes: three numbers of each component."""
     tree, in_core = run.model.tree, frames_in_core(run.model, run.q[0])
     bodies = [(tree.index[name], *in_core[tree.index[name]], *of_body.of_core()) for name, of_body in chosen.items()]
     return _found(run, lambda driven: _core.point_reader(driven, bodies))
@@ -153,7 +157,7 @@ def _found(run: Run, reader: Reader, system: MultibodySystem | None = None) -> _
 
 
 def left_paths(source: Run, run: Run) -> Iterator[str]:
-    """Yield a warning if a replay under the forces of all rows leaves the motion of `source`."""
+    """Yield a warning for each path that `run`, a replay of the forces of `source`, leaves."""
     now = (run.time >= 0.0) & (run.time <= source.time[-1])
     model, times, q = source.model, run.time[now], run.q[now]
     if not len(times):

@@ -21,7 +21,7 @@ class _Looks(NamedTuple):
 
     intervals: int = 2000  # of a run, at least: a vibration of 10 periods is seen to (π 10/2000)²/2 of its amplitude
     kept: int = 16_777_216  # numbers of all states at most: 128 MiB
-    parts_of_step: int = 4  # in runs whose differences count: their peaks have to be known as well as their derivatives
+    parts_of_step: int = 4  # in runs whose differences count
     all_up_to: int = 16_384  # states of a loop; of more those from which others follow; of repeated runs as many a part
     follows: float = 1e-4  # of the largest value, by which a straight line may miss one: the error of means
     most: int = 1_048_576  # states, all of which are looked at where what rings leaves none out
@@ -37,8 +37,7 @@ SAME = 1e-13  # of the latest time, by which equal ones differ at most: round-of
 def new_samples(times: Array, analysis: IntegratedAnalysis, size: int) -> _core.Samples | None:
     """Samples for an integration over the output `times` (T,), s; None where there is nothing to integrate.
 
-    `size`: numbers of a state, 0 of a robot that cannot move. Runs whose differences count have more samples: their
-    peaks have to be known as well as their derivatives.
+    `size`: length of a state, 0 of a robot that cannot move. Runs that are compared with repetitions have more samples.
     """
     duration = float(times[-1] - times[0])
     if not size or duration <= 0.0:
@@ -49,7 +48,7 @@ def new_samples(times: Array, analysis: IntegratedAnalysis, size: int) -> _core.
 
 
 def reached_samples(samples: _core.Samples | None, time: Array) -> tuple[Array, Array] | None:
-    """Times (k,), s, and states (k, n) of those before the last output, of `time` (T,); None where there are none."""
+    """Times (k,), s, and states (k, n), q and v, of samples up to the last output of `time` (T,), s; None if none."""
     if samples is None or not len(time):
         return None
     times = samples.times  # ascending
@@ -58,9 +57,9 @@ def reached_samples(samples: _core.Samples | None, time: Array) -> tuple[Array, 
 
 
 def some_of(times: Array, rates: Array, ends: Array, most: int) -> Indices:
-    """Numbers of some of the samples at `times` (k,), s, at `most` and about the highest of `rates` (k, n_v).
+    """Numbers of about `most` of the samples at `times` (k,), s, and of those about the highest of `rates` (k, n_v).
 
-    The first, the last, and those at which steps have to end are among them.
+    The first, the last, and those at the times `ends`, s, are among them.
     """
     count = len(times)
     at_ends = np.flatnonzero(np.isin(times, ends))
@@ -69,9 +68,10 @@ def some_of(times: Array, rates: Array, ends: Array, most: int) -> Indices:
 
 
 def telling(times: Array, values: Array, sizes: Array) -> Indices:
-    """Numbers of the samples at `times` (k,), s, between which `values` (k, columns) are linear.
+    """Numbers of those samples at `times` (k,), s, between which `values` (k, columns) are nearly linear.
 
-    But for `LOOKS.follows` of their `sizes` (columns,). The ends of `LOOKS.evenly` intervals are among them.
+    Errors are at most `LOOKS.follows` times `sizes` (columns,), in the unit of the values. Every n-th sample, of
+    `LOOKS.evenly` in all, is among them.
     """
     chain, misses = np.arange(len(times)), LOOKS.follows * sizes
     while len(chain) > 2:
@@ -87,9 +87,10 @@ def telling(times: Array, values: Array, sizes: Array) -> Indices:
 
 
 def about_highest(some: Indices, quantities: Array, beside: int = 1) -> Indices:
-    """Numbers of all samples about the highest of `quantities` (T, columns), which are known at samples `some` (T,).
+    """Numbers of all samples about the highest local maxima of each of `quantities` (T, columns).
 
-    They reach from `beside` of `some` before each maximum to as many after it.
+    Quantities are known at the samples with numbers `some` (T,). Samples from `beside` of these before a maximum to as
+    many after it count.
     """
     tops = sorted({k for column in np.abs(quantities).T for k in _highest(column)})
     about = [np.arange(some[max(k - beside, 0)], some[min(k + beside, len(some) - 1)] + 1) for k in tops]
@@ -104,9 +105,9 @@ def _highest(values: Array) -> list[int]:
 
 
 def in_order(outputs: Array, samples: Array) -> Indices:
-    """Rows of outputs (T,) with samples (k,) behind them, both in s and ascending, in the order of time.
+    """Numbers in (outputs (T,), samples (k,)), each ascending times in s, that put both in the order of time.
 
-    Of times that are equal to round-off the output alone: steps that end at samples of a controller meet outputs so.
+    Of times that are equal to round-off only the output counts: steps may end there at samples of a controller.
     """
     times, after = np.concatenate([outputs, samples]), np.searchsorted(outputs, samples)
     padded = np.concatenate([[-np.inf], outputs, [np.inf]])

@@ -44,10 +44,10 @@ def stops(
 ) -> Array:
     """Return times (n,), s, at which integration steps must end in a run with outputs at `times` (T,), s.
 
-    Steps look at paths and loads at their stages alone, and might pass a pulse. So they end where conditions of paths
-    and loads change, t < 0.1 at 0.1 s, and along parts of brief pieces in which a path moves far or conditions change.
-    Steps of rigid robots may be as long as the run. `is_driven`: paths alone move the robot, and steps end where its
-    forces have to be looked at. `is_replay`: forces follow from paths that steps do not know, and end where these bend.
+    Steps look at paths and loads at their stages alone, and might pass a pulse. So they end where a condition such as
+    t < 0.1 changes in paths and loads, and in brief pieces in which a path moves far or conditions change.
+    `is_driven`: paths alone move the robot; steps also end where its forces have to be looked at. `is_replay`: forces
+    follow from other paths; steps also end where these bend.
     """
     ends, paths, loads = times[[0, -1]], list(paths), list(loads)
     targets = [target for path in paths for _, target in path.targets]
@@ -132,9 +132,9 @@ def _parts(breaks: Array, chosen: Booleans) -> Array:
 
 
 def path_times(times: Array, paths: Iterable[Trajectory], end: float, others: Iterable[TimeFunction] = ()) -> Array:
-    """Return times (T,), s: outputs `times`, and enough times between for `paths` from 0 to `end` (s).
+    """Return times (n,), s: outputs `times` (T,), and times between that resolve `paths` from 0 to `end` (s).
 
-    `others`: loads, and whatever else is prescribed.
+    `others`: loads and other prescribed functions, which are resolved, too.
     """
     paths, others, ends = list(paths), list(others), times[[0, -1]]
     functions = [*(target for path in paths for _, target in path.targets), *others]
@@ -187,7 +187,7 @@ STILL = 0.5  # of a run, in which way points are over: the other part is rest
 
 
 def path_warnings(analysis: object, times: Array, paths: Iterable[Trajectory]) -> Iterator[str]:
-    """Yield warnings on features of `paths` that outputs at `times` (T,), s, of the `analysis` miss."""
+    """Yield warnings on features of `paths` that outputs of the `analysis` at `times` (T,), s, miss."""
     if not isinstance(analysis, TimedAnalysis) or np.count_nonzero((times >= 0.0) & (times <= analysis.end)) < 2:
         return  # it ended before the path began
     for path in paths:
