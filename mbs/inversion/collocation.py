@@ -24,14 +24,14 @@ ROUND_OFF = 1e-8  # below which a step that no longer shrinks is round-off
 
 
 class Boundary(NamedTuple):
-    """rows · (y − y_0) = 0 for y = (p, ṗ): rows (k, 2n), y_0 (2n,)."""
+    """k boundary conditions rows · (y − state) = 0 of y = (p, ṗ): `rows` (k, 2n), `state` (2n,), SI units."""
 
     rows: Array
     state: Array
 
 
 class Scheme(NamedTuple):
-    """Collocation points c (s,) on [0, 1], and weights of single and double integrals of the interpolant."""
+    """s collocation points `c` on [0, 1], and weights of values there in single and double integrals of p̈."""
 
     c: Array
     to_powers: Array  # (s, s) values → coefficients of 1, ξ, ξ² …
@@ -42,9 +42,9 @@ class Scheme(NamedTuple):
 
 
 def gauss(stages: int = STAGES, *, of_second_order: bool = False) -> Scheme:
-    """Collocation at the zeros of the Legendre polynomial (Hairer, Nørsett and Wanner, II.7).
+    """Collocation at the zeros of the Legendre polynomial of degree `stages` (Hairer, Nørsett and Wanner, II.7).
 
-    `of_second_order`: p at the points is the second integral of the polynomial for p̈ there.
+    `of_second_order`: p at the points is the second integral of the polynomial for p̈; else Gauss's method for (p, ṗ).
     """
     c = (np.polynomial.legendre.leggauss(stages)[0] + 1) / 2  # type: ignore[no-untyped-call, unused-ignore]
     m = np.arange(stages)
@@ -65,12 +65,11 @@ def between(breaks: Array, xi: Array) -> Array:
 
 @struct
 class Problem:
-    """The equations, for N nodes at once: times (N,), p, ṗ, p̈ (N, n).
+    """Equations r(t, p, ṗ, p̈) = 0 with boundary conditions, for N `times` (N,), s, at once: p, ṗ, p̈ (N, n), SI units.
 
     residual(times, p, ṗ, p̈) is r (N, n). derivatives(times) are ∂r/∂p̈, ∂r/∂ṗ, ∂r/∂p (3, N, n, n): they only
     set the pace of Newton's method. `scale` (n,) is about |ṗ|/|p|, 1/s, `size` a typical |scale · p|. All conditions at
-    the start make it an initial value problem; then intervals have to resolve vibrations, or those of varying equations
-    grow.
+    the start make it an initial value problem; then intervals have to resolve vibrations, or errors of these grow.
     """
 
     residual: Callable[[Array, Array, Array, Array], Array]
@@ -84,9 +83,9 @@ class Problem:
 
 @struct
 class Found:
-    """p(t) as piecewise polynomials, (n,) values; whether Newton's method converged, and its iterations.
+    """A solution p(t) of `collocate`, (n,) values; whether Newton's method converged, and its iterations.
 
-    `worst` is the time, s, at which its last step was largest, or the residual was NaN.
+    `worst` is the time, s, at which the last Newton step was largest, or the residual was NaN.
     """
 
     curve: PPoly
@@ -96,7 +95,7 @@ class Found:
 
 
 def collocate(problem: Problem, breaks: Array, guess: PPoly) -> Found:
-    """Solve on the given breaks (N+1,) from a `guess` of p(t), (n,) values."""
+    """Solve `problem` by Newton's method on `breaks` (N+1,), s, from a `guess` of p(t), (n,) values."""
     h, times = np.diff(breaks), between(breaks, problem.scheme.c)
     N, s, n = len(h), len(problem.scheme.c), len(problem.scale)
     linear = _LinearSystem(problem, breaks, [x.reshape(N, s, n, n) for x in problem.derivatives(times)])
@@ -122,7 +121,10 @@ def collocate(problem: Problem, breaks: Array, guess: PPoly) -> Found:
 
 
 def stage_states(scheme: Scheme, h: Array, p: Array, v: Array, K: Array) -> tuple[Array, Array]:
-    """States p and ṗ (N, s, n) at the Gauss points, from their values at the breaks and K (N, s, n)."""
+    """States p and ṗ (N, s, n) at the Gauss points of N intervals of lengths `h` (N,), s.
+
+    From p and ṗ = `v` (N + 1, n) at the breaks, and p̈ = K (N, s, n) at the Gauss points.
+    """
     step = h[:, None, None]
     once, twice = (np.einsum("ij,Njn->Nin", a, K) for a in (scheme.stage_once, scheme.stage_twice))
     p_stages = p[:-1, None] + scheme.c[:, None] * step * v[:-1, None] + step**2 * twice
@@ -130,7 +132,7 @@ def stage_states(scheme: Scheme, h: Array, p: Array, v: Array, K: Array) -> tupl
 
 
 def piecewise(scheme: Scheme, breaks: Array, p: Array, v: Array, K: Array) -> PPoly:
-    """p(t) (n,) from p, ṗ (N + 1, n) at the `breaks` (N + 1,), s, and p̈ at the stages, K (N, s, n)."""
+    """p(t) (n,) from p, ṗ = `v` (N + 1, n) at the `breaks` (N + 1,), s, and p̈ = K (N, s, n) at the Gauss points."""
     h = np.diff(breaks)[:, None]
     powers = np.einsum("mi,Nin->mNn", scheme.to_powers, K)
     integrated = [x / ((m + 1) * (m + 2) * h**m) for m, x in enumerate(powers)]
@@ -138,10 +140,10 @@ def piecewise(scheme: Scheme, breaks: Array, p: Array, v: Array, K: Array) -> PP
 
 
 class Elimination:
-    """Newton's equations of the stages, solved interval by interval: by values (p, ṗ) at their starts, and others.
+    """Newton's equations E K + G (p, ṗ) = b for p̈ = K at the s Gauss points of N intervals, solved for K.
 
-    With right sides b (N, s n, …) of E K + G (p, ṗ) = b: `E_inverse` (N, s n, s n), `G` (N, s n, 2n), and the
-    `response` (N, s, n, 2n) of K.
+    (p, ṗ) (2n,) are values where an interval starts. `E_inverse` (N, s n, s n), `G` (N, s n, 2n), and `response`
+    (N, s, n, 2n), −E⁻¹ G, of K to (p, ṗ).
     """
 
     def __init__(self, scheme: Scheme, h: Array, derivatives: Sequence[Array]) -> None:
@@ -158,7 +160,7 @@ class Elimination:
         self.response = -(self.E_inverse @ self.G).reshape(N, s, n, 2 * n)
 
     def at_end(self, p: Array, v: Array, K: Array) -> tuple[Array, Array]:
-        """States p and ṗ (N, n, …) at the ends of intervals for p, ṗ at their starts and K (N, s, n, …)."""
+        """States p, ṗ (N, n, …) at ends of intervals for p, ṗ = `v` at their starts and p̈ = K (N, s, n, …); SI."""
         h = self.h.reshape(-1, *(1 for _ in K.shape[2:]))
         once, twice = (np.einsum("i,Ni...->N...", b, K) for b in (self.scheme.end_once, self.scheme.end_twice))
         return p + h * v + h**2 * twice, v + h * once

@@ -1,8 +1,7 @@
 """Inverse dynamics with motors only: the analysis `kind = "motors-only"`. SI units.
 
 `output = "tip"` follows the path exactly, by stable inversion with pre- and post-actuation where zeros lie in the right
-half plane. `output = "redefined"` follows it with a point nearer the joints, and reports what that leaves at the tip:
-the part of the vibration that the output does not see.
+half plane. `output = "redefined"` follows it with a point nearer the joints; the rest of the vibration is at the tip.
 """
 
 import math
@@ -43,7 +42,7 @@ REST = 1e-9  # speed of a path at rest, relative to its values over the time of 
 
 @struct
 class AroundPath(Details):
-    """Pre- and post-actuation times of motors, s, and the inversion of the path."""
+    """Pre- and post-actuation times of motors, s, the robot `held` on its path, and the inversion of that."""
 
     _: KW_ONLY
     pre_actuation: float
@@ -53,19 +52,19 @@ class AroundPath(Details):
 
 
 def where(scene_path: Path, analysis: Analysis) -> str:
-    """Scene and analysis, as messages begin."""
+    """Scene and name of the analysis, with which messages begin."""
     return f'{scene_path}: analysis "{analysis.name}"'
 
 
 def is_minimum_phase(linear: Linearisation) -> bool:
-    """Whether no zero lies in the right half plane at rest, and none long enough along the path to matter."""
+    """Whether no zero is in the right half plane at rest, and none grows more than e-fold along the path."""
     at_rest = linear.zeros[[0, -1]]
     grows = linear.zeros.real.max() * linear.times[-1] > GROWTH
     return not (is_unstable(at_rest).any() or grows)
 
 
 def describe_zeros(linear: Linearisation) -> str:
-    """The slowest zeros in the right half plane, in 1/s."""
+    """The zeros in the right half plane, 1/s, where one grows fastest; of many the slowest four."""
     row = max(linear.zeros, key=lambda s: float(s.real.max()))
     unstable = row[is_unstable(row)]
     shown = ", ".join(f"{s.real:.4g}{f' ± {s.imag:.4g}i' if s.imag > 0 else ''}" for s in unstable if s.imag >= 0)
@@ -88,7 +87,10 @@ def check_rest(servo: Servo, analysis: TimedAnalysis, ends: Iterable[float]) -> 
 
 
 def decay_times(linear: Linearisation, *, needs_future: bool) -> tuple[float, float]:
-    """Times (s) in which the zero dynamics dies out before the path and, if it `needs_future`, after it; else 0."""
+    """Times (s) of the zero dynamics around the path: growing parts begin before it, decaying ones end after it.
+
+    The latter counts if the input `needs_future` values of the path; else it is 0.
+    """
     first, last, light, end = linear.zeros[0].real, linear.zeros[-1].real, linear.is_light[0], float(linear.times[-1])
     is_ahead = linear.is_future[0] & (first > 0)
     grow, growing_vibrations, decay = first[is_ahead & ~light], first[is_ahead & light], -last[last < 0]
@@ -97,7 +99,7 @@ def decay_times(linear: Linearisation, *, needs_future: bool) -> tuple[float, fl
 
 
 def durations(linear: Linearisation, given: Iterable[float | None], step: float) -> tuple[float, float]:
-    """Pre- and post-actuation (s): as given, or until the zero dynamics has died out; whole output steps (s)."""
+    """Pre- and post-actuation (s): as `given`, or as long as the zero dynamics lasts; multiples of `step` (s)."""
     automatic = decay_times(linear, needs_future=bool(linear.is_future[0].any()))
     chosen = (duration if value is None else value for value, duration in zip(given, automatic, strict=True))
     before, after = (math.ceil(time / step - 1e-9) * step for time in chosen)
@@ -105,7 +107,7 @@ def durations(linear: Linearisation, given: Iterable[float | None], step: float)
 
 
 def cause_of(inversion: Inversion) -> str:
-    """Why no motion was found and when it was worst; where zeros change sides, no bounded one need exist."""
+    """Why no motion was found, and when: zeros that change sides or pass infinity, or its iteration; else ""."""
     linear, is_coarse = inversion.linearisation, inversion.status == "mesh too coarse"
     if not is_coarse and inversion.status != "inversion not converged":
         return ""
@@ -167,7 +169,7 @@ class MotorsOnly(TimedAnalysis):
         return output_times(self.end, self.output_step, self.pre_actuation or 0.0, self.post_actuation or 0.0)
 
     def run(self, context: Context) -> Run:
-        """Motion and motor forces for the trajectories, no other force acting; before and after the path it is held.
+        """Motion and motor forces for the trajectories, which rest before and after the path; no other force acts.
 
         Raises `InputError` for a path that is not at rest where it has to be, motors that do not fit, a path out of
         reach, and a given factor whose output is not minimum phase; `SolveError` where no equilibrium or no motion is

@@ -35,16 +35,16 @@ class Stopped(Exception):  # noqa: N818 (nothing is wrong)
 
 @struct
 class Servo:
-    """The robot under its path, held before 0 and after `end`, s; `factor` 1 takes the path's own points as output.
+    """The robot under its path, at rest before 0 and after `end`, s; with `factor` 1 its points are the output.
 
-    A smaller factor takes where they would be with the same motor coordinates and the deflections `factor` p +
-    `offset`, which is what is expected of the rest (Wang and Vidyasagar 1991; De Luca and Siciliano 1993).
-    At `near_times` (N,), s, `near` (N, n_q) are postures without deflections.
+    With a smaller factor, the output is where these would be with the same motor coordinates and the deflections
+    `factor` p + `offset` in place of p (Wang and Vidyasagar 1991; De Luca and Siciliano 1993).
+    At `near_times` (N,), s, `near` (N, n_q), rad and m, are postures without deflections.
 
     Attributes:
         where: scene and analysis, for messages.
-        goes_on: is asked again and again whether to go on.
-        offset: what is expected of deflections that the output leaves out: one for each mode of all bodies, or none.
+        goes_on: is called often; False stops the solution.
+        offset: expected share of deflections that the output leaves out, m·√kg, by mode of all bodies, or ().
     """
 
     model: Model
@@ -92,7 +92,7 @@ class Servo:
 
     @cached_property
     def motion(self) -> PrescribedMotion:
-        """Motor coordinates of the path for given p(t), with deflections `factor` p + `offset`."""
+        """Equations of motor coordinates on the path for given p(t); in the plane where the robot allows that."""
         path = fastest_mechanism(self.model)
         if isinstance(path, _core.SpatialDriven):
             return self.equations()
@@ -103,7 +103,7 @@ class Servo:
         return motion
 
     def equations(self) -> _core.SpatialPrescribedMotion:
-        """A new copy of the 3D equations."""
+        """New equations of motor coordinates on the path for given p(t), in 3D."""
         path = driven_mechanism(self.model)
         motion = _core.SpatialPrescribedMotion(path, self.near[0])
         if self.factor != 1.0 or self.offset:
@@ -113,13 +113,13 @@ class Servo:
         return motion
 
     def postures(self, times: Array) -> Array:
-        """Postures (T, n_q) of the path without deflections, nearest to `times` (T,), s."""
+        """Postures (T, n_q), rad and m, of the path without deflections, nearest to `times` (T,), s."""
         return self.near[np.searchsorted((self.near_times[1:] + self.near_times[:-1]) / 2, times)]
 
     def residuals(self, times: Array, p: Array, v: Array, a: Array) -> Array:
         """Modal forces r (N, n), N/√kg, that motors do not supply at `times` (N,), s; NaN without a posture.
 
-        p, ṗ and p̈ are v and a: (N, n), m·√kg and s. Raises `Stopped`.
+        p, ṗ = v and p̈ = a are (N, n), m·√kg and s. Raises `Stopped`.
         """
         r, near = np.zeros_like(p), self.postures(times)
         for k in range(0, len(times), MOST_STATES):
@@ -130,7 +130,7 @@ class Servo:
         return r
 
     def forces(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array]:
-        """`residuals` r (N, n), N/√kg, and motor torques τ (N, motors), N·m or N."""
+        """Residual modal forces r (N, n), N/√kg, and motor torques τ (N, motors), N·m or N; p, ṗ, p̈ as `residuals`."""
         states = self.motion.motion(times.tolist(), p, v, a, self.postures(times))
         return states.left[:, self.of_modes], states.tau
 
@@ -144,15 +144,16 @@ class Servo:
         return np.flatnonzero(~self.model.tree.joint_columns)
 
     def slopes(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
-        """Derivatives (N, n + motors, n), SI units, of (r, τ) as `forces` has them by p̈, ṗ and p."""
+        """Derivatives (N, n + motors, n), SI units, of (r, τ) of `forces` by p̈, ṗ and p."""
         return left_slopes(self.model, self.motion, (p, v, a), times, self.postures(times))
 
 
 def make_servo(model: Model, end: float, where: str, goes_on: Callable[[], bool], kind: str = "motors-only") -> Servo:
     """The robot under a path that is held before 0 and after `end` (s), whose own points are the output.
 
-    `where` and `kind` are for messages. Raises `InputError` unless there are as many motors and specified components as
-    degrees of freedom, and modes, and for a path that jumps, or that the undeformed robot cannot follow; `Stopped`.
+    `where` and `kind` are for messages; `Stopped` is raised when `goes_on` returns False. Raises `InputError` without
+    modes, for a path that jumps or that the undeformed robot cannot follow, and unless motors and path components are
+    as many as degrees of freedom.
     """
     rows = tuple(_with_functions(row, lambda function: function.held(0.0, end)) for row in model.rows)
     held = replace(model, rows=rows)

@@ -1,10 +1,8 @@
 """Stable inversion: the bounded p(t) for which motors alone carry a path (Devasia, Chen and Paden 1996; Seifried 2014).
 
-Where zeros lie in the right half plane, integrating forward diverges. Decaying motions follow from the past, growing
-ones by the future: at rest long before the path the part in the stable subspace vanishes, at rest long after it the
-part in the unstable one (of lightly damped vibrations: `zero_dynamics`). Collocation solves this two-point
-problem at once, on intervals that are cut where r(t) ≠ 0 between the collocation points. Without such zeros it is an
-initial value problem, solved window by window, each with intervals as short as r(t) asks for.
+Where zeros lie in the right half plane, collocation solves a two-point problem (docs/theory.md, Torque-only tracking),
+on intervals that are divided where r(t) ≠ 0 between the collocation points. Without such zeros it is an initial value
+problem, solved window by window, each with intervals as short as r(t) requires.
 """
 
 from collections.abc import Callable, Iterable
@@ -36,11 +34,11 @@ PROBES = np.sort(np.concatenate([(GAUSS.c[1:] + GAUSS.c[:-1]) / 2, [0.01, 0.5, 0
 
 @struct
 class Inversion:
-    """p(t) from −pre to end + post, and how it was found.
+    """`curve` p(t), m·√kg, from before the path to after it, and how it was found.
 
-    `unmet` is the largest modal force that nobody supplies between collocation points, relative to the largest elastic
-    one, and `worst` when that is (s), or when the iteration is farthest from its end; `off_rest` how far from rest the
-    start is: ‖(ω(p − p_0), ṗ)‖ relative to its peak.
+    `unmet` is the largest residual modal force between collocation points, relative to the largest elastic one;
+    `worst` (s) is when it occurs, or where iterations converge least; `off_rest` is the distance from rest at the
+    start, ‖(ω(p − p_0), ṗ)‖ relative to its peak.
     """
 
     servo: Servo
@@ -56,10 +54,10 @@ class Inversion:
 def invert(
     servo: Servo, linear: Linearisation, pre: float, post: float, tolerance: float, progress: Callable[[float], bool]
 ) -> Inversion:
-    """Solve r(t, p, ṗ, p̈) = 0 on [−pre, end + post] (s) until the error between breaks is below `tolerance`.
+    """Solve r(t, p, ṗ, p̈) = 0 on [−pre, end + post] (s) until r between breaks is below `tolerance`.
 
-    That is a share of the largest elastic force. `progress` of the time reached (s) says whether to go on.
-    Raises `SolveError` where there is no equilibrium to start from or to end in, or where zeros change sides.
+    `tolerance` is a share of the largest elastic force. `progress`, called with the time reached (s), says whether to
+    go on. Raises `SolveError` where there is no equilibrium at the start or the end, or where zeros change sides.
     """
     end = float(linear.times[-1])
     start, finish = _boundaries(servo, linear, -pre, end + post)
@@ -234,7 +232,7 @@ def _boundary(servo: Servo, t: float, s: ComplexArray, is_enforced: Booleans, co
 
 
 def with_corners(breaks: Array, functions: Iterable[_core.TimeFunction]) -> Array:
-    """`breaks` with the times between, s, at which comparisons of t in `functions` change."""
+    """`breaks` (N + 1,), s, and the times inside at which conditions such as t < 0.1 change in `functions`."""
     corners = np.unique([t for function in functions for t in function.switches()])
     near = np.abs(breaks[:, None] - corners).min(axis=0) <= SHORTEST * (breaks[-1] - breaks[0])
     within = (corners > breaks[0]) & (corners < breaks[-1])
@@ -242,14 +240,14 @@ def with_corners(breaks: Array, functions: Iterable[_core.TimeFunction]) -> Arra
 
 
 def cut(breaks: Array, excess: Array) -> Array:
-    """Divide each interval of `breaks` (N + 1,), s, by its `excess` (N,) of error over tolerance; error ∝ h⁴."""
+    """Return `breaks` (N + 1,), s, with intervals divided by their `excess` (N,), error by tolerance; error ∝ h⁴."""
     parts = np.where(excess > 1, np.clip(np.ceil(1.1 * np.minimum(excess, 1e9) ** 0.25), 2, MOST_PARTS), 1).astype(int)
     pieces = [np.linspace(a, b, k, endpoint=False) for a, b, k in zip(breaks[:-1], breaks[1:], parts, strict=True)]
     return np.concatenate([*pieces, breaks[-1:]])
 
 
 def halved(breaks: Array, which: Booleans | slice = slice(None)) -> Array:
-    """Breaks (N + 1,) with those intervals halved, by default all."""
+    """`breaks` (N + 1,), s, with the intervals `which` halved, by default all."""
     return np.sort(np.concatenate([breaks, ((breaks[1:] + breaks[:-1]) / 2)[which]]))
 
 

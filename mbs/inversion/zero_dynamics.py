@@ -1,10 +1,7 @@
 """The zero dynamics along a path: its zeros about quasi-static links, and whether past or future tells their motions.
 
-With p(t) given the joints follow from the path, and r(t, p, ṗ, p̈), the modal forces that motors do not supply, is what
-has to vanish: the zero dynamics about a path that is held (Blajer and Kolodziejczyk 2004; Seifried 2014, ch. 4).
-
-What decays follows from the past, what grows from the future (Devasia, Chen and Paden 1996). Lightly damped vibrations,
-whose zeros may cross the imaginary axis along the path, follow from the past unless they grow too far.
+With p(t) given the joints follow from the path, and modal forces r(t, p, ṗ, p̈) that motors do not supply have to vanish
+(Blajer and Kolodziejczyk 2004; Seifried 2014, ch. 4): docs/theory.md, Torque-only tracking.
 """
 
 from functools import cached_property
@@ -40,7 +37,7 @@ class LinearDynamics:
 
 
 def linear_dynamics(servo: Servo, times: Array, p: Array, v: Array, a: Array) -> LinearDynamics:
-    """Derivatives of r at N nodes: times (N,), s, p, ṗ, p̈ (N, n)."""
+    """Derivatives of r at N `times` (N,), s, with p, ṗ = v, p̈ = a (N, n), m·√kg and s."""
     return LinearDynamics(times, *(x[:, : p.shape[1]] for x in servo.slopes(times, p, v, a)))
 
 
@@ -96,9 +93,9 @@ TINY = 1e-300
 
 @struct
 class Linearisation:
-    """Linear internal dynamics at N times of the path, about the quasi-static `shape` (N, n) of the links.
+    """Linear internal dynamics at N times of the path, about the quasi-static `shape` (N, n), m·√kg, of the links.
 
-    `scale` is that of the output, with which zeros are computed.
+    `scale` (n,), rad/s: frequencies of the modes.
     """
 
     dynamics: LinearDynamics
@@ -119,11 +116,9 @@ class Linearisation:
     def is_future(self) -> Booleans:
         """Whether zeros (N, 2n) belong to motions that the future determines.
 
-        Those in the right half plane; but lightly damped vibrations, whose zeros may cross the imaginary axis along the
-        path, only where they grow too far over all of it, by exp ∫ Re s dt. Else they start at rest and ring on: a jump
-        in jerk excites them by about 10/(|s| T) of a deflection, of which they may come to a tenth. A zero that leaves
-        through infinity and comes back elsewhere counts at each time as it is then. So do conjugates of which one
-        was a motion that the future tells, and the other was not.
+        Those in the right half plane; lightly damped vibrations, whose zeros may cross the imaginary axis along the
+        path, only where they grow too far over all of it (docs/theory.md, Torque-only tracking). A zero that passes
+        through infinity counts at each time by itself. So do conjugates of which the future determines only one.
         """
         places, jumps = self._followed
         s, T = np.take_along_axis(self.zeros, places, axis=1), float(self.times[-1])
@@ -171,9 +166,9 @@ class Linearisation:
 
 
 def shape_along(servo: Servo, times: Array) -> Array:
-    """P (N, n) of links that follow their loads at `times` (N,), s, as springs would: r(t, p, 0, 0) = 0.
+    """Quasi-static modal coordinates p (N, n), m·√kg, of links at `times` (N,), s: r(t, p, 0, 0) = 0.
 
-    Raises `SolveError` where they are too soft for that.
+    Raises `SolveError` where links are too soft.
     """
     p, is_met = _shapes(servo, times)
     _check(servo, times, is_met)
@@ -181,7 +176,10 @@ def shape_along(servo: Servo, times: Array) -> Array:
 
 
 def linearise(servo: Servo, end: float, samples: int = SAMPLES) -> Linearisation:
-    """The linear dynamics about `shape_along`, up to `end`, s. Raises `SolveError` as that does."""
+    """The linear internal dynamics about quasi-static links at `samples` times of the path, up to `end`, s.
+
+    Raises `SolveError` where links are too soft.
+    """
     times = np.linspace(0.0, end, samples)
     p = shape_along(servo, times)
     dynamics = linear_dynamics(servo, times, p, 0 * p, 0 * p)

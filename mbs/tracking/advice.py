@@ -35,9 +35,10 @@ NONE = 1e-4  # of the limits: voltages that motors alone do without
 
 @struct
 class Bounds:
-    """Voltages (k,) V that zeros (k,) 1/s need at least, the largest first, at the `times` (k,) s when they count.
+    """Least voltages (k,) V that the zeros (k,) 1/s require, the largest first.
 
-    `relief` (k,) V/m: by how much less for a larger path tolerance; zero where no point has a path.
+    `times` (k,) s: the start or end of the actuation, where each counts. `relief` (k,) V/m: decrease per path
+    tolerance; zero where no point has a path.
     """
 
     zeros: ComplexArray
@@ -48,7 +49,10 @@ class Bounds:
 
 @struct
 class Posed:
-    """What is asked for, on which breaks (s), `coarse` ones for a least voltage; time before and after the path (s)."""
+    """A tracking problem, with `breaks` (s), `coarse` ones for the least voltage.
+
+    `around`: pre- and post-actuation, s.
+    """
 
     asked: Transition
     linear: Linearisation
@@ -66,12 +70,10 @@ class Posed:
 
 
 def bounds_of_zeros(asked: Transition, linear: Linearisation, around: tuple[float, float]) -> Bounds:
-    """Least voltages that each zero needs, V, with patches in proportion to `asked.units`; `around` the path, s.
+    """Least voltages that each zero needs, V, shared as `asked.units`; `around`: pre- and post-actuation, s.
 
-    Rest at the start requires ∫ e^{−st} ℓᵀB V dt = −ζ of each zero in the right half plane, with its left eigenvector ℓ
-    and ζ = ℓᵀ(y − y_rest) of stable inversion there: |V| ≥ |ζ| Re s / Σ|ℓᵀB|; likewise the others at the end.
-    A path error e takes off up to |ℓᵀM⁻¹(∂r/∂e + s ∂r/∂ė + s² ∂r/∂ë)| e_max. Vibrations (`LIGHT`) are left out.
-    Raises `SolveError` where motors alone have no bounded motion.
+    By docs/theory.md, (44): of zeros in the right half plane for rest at the start, of the others for rest at the end.
+    Vibrations (`LIGHT`) are left out. Raises `SolveError` where motors alone have no bounded motion.
     """
     servo, end, unit = asked.driven, float(linear.times[-1]), asked.units
     pre, post = map(max, decay_times(linear, needs_future=True), around)
@@ -101,8 +103,8 @@ def bounds_of_zeros(asked: Transition, linear: Linearisation, around: tuple[floa
 def _remedies(posed: Posed, intervals: int, share: float) -> Iterator[str]:
     """What would bring a least voltage of `share` times the limits within them, each by a few solutions.
 
-    It falls about as e^{−s t} with the time t around the path, s the slowest zero to the right (Zou and Devasia, 1999),
-    as T^−m with the path's time, m the order with which it starts, and linearly with a path tolerance.
+    It falls as in `check_reach`, s the slowest zero to the right (Zou and Devasia, 1999), m the order of the path's
+    start.
     """
     asked, (pre, post), zeros = posed.asked, posed.around, posed.linear.zeros.real
     servo, end, given = asked.driven, asked.driven.end, asked.tolerance or Tolerance(0.0)
@@ -155,7 +157,8 @@ def _enough(share_with: Callable[[float], float], share: float, rate: float) -> 
 def check_reach(posed: Posed, least: Tracked | None) -> None:
     """Raise `SolveError` where a zero, or the least voltage, surely needs `OUT_OF_REACH` times the limits.
 
-    What would do follows from how the bound of the zero falls: as e^{−s t}, as T^−m, linearly with a path tolerance.
+    Its advice is by the bound of the zero s: ∝ e^{−s t} of the time t around the path, ∝ T^−m of the path's time T, and
+    linear in a path tolerance.
     """
     asked, bounds, limit = posed.asked, posed.bounds, posed.asked.units.max()
     share = 0.0 if least is None else least.surely
@@ -184,9 +187,9 @@ def check_reach(posed: Posed, least: Tracked | None) -> None:
 
 
 def check_motors(posed: Posed) -> None:
-    """Raise `SolveError` where motors need more than their limits, with patches of `OUT_OF_REACH` times theirs.
+    """Raise `SolveError` where motors exceed their limits even with patches of `OUT_OF_REACH` times theirs.
 
-    Their least torque is looked for where torques along the path exceed the limits without patches.
+    The least torque is sought only where torques along the path exceed the limits without patches.
     """
     limits, linear, servo = posed.asked.limits, posed.linear, posed.asked.driven
     peaks = np.abs(servo.quasi_static(linear.times, linear.shape)).max(axis=0)
@@ -229,7 +232,7 @@ def check_found(context: Context, posed: Posed, least: Tracked) -> None:
 
 
 def raised(posed: Posed) -> str:
-    """Advice to raise the limits that there are: of motors, by their joints, and of patches."""
+    """Advice to raise limits: those of motors, by joint, and of patches, where they have any."""
     limits, joints = posed.asked.limits, motor_names(posed.asked.driven.model)
     names = [name for name, most in zip(joints, limits.torque, strict=True) if most < np.inf]
     keys = [f"moment_limit of {' and '.join(names)}"] if names else []
@@ -239,7 +242,7 @@ def raised(posed: Posed) -> str:
 
 
 def causes(context: Context, posed: Posed) -> str:
-    """Why there may be no motion: zeros at infinity, ends of the path, patches far from its point; may be empty."""
+    """Likely causes of no motion: zeros at infinity, rough ends of the path, patches far from its point; else ""."""
     servo, linear = posed.asked.driven, posed.linear
     texts = [*singular_times(servo, linear), *rough_ends(servo.functions, servo.end), *_far_patches(context, linear)]
     return "; ".join(texts)
@@ -256,9 +259,9 @@ def needs_none(posed: Posed, least: Tracked) -> bool:
 
 
 def warnings_of(context: Context, posed: Posed, intervals: int, least: Tracked) -> Iterator[str]:
-    """Warnings: what would do where limits are too small, ends of the path and places of patches that cost voltage.
+    """Yield warnings: limits too small, with remedies; ends of the path and places of patches that cost voltage.
 
-    `intervals` are those that the analysis begins with.
+    `intervals`: number with which the analysis begins.
     """
     servo, limits = posed.asked.driven, np.unique(posed.asked.units)
     if is_beyond(posed, least):
@@ -280,7 +283,7 @@ def warnings_of(context: Context, posed: Posed, intervals: int, least: Tracked) 
 
 
 def price_of_tolerance(asked: Transition, least: Tracked) -> float | None:
-    """V/m, by how much less the least voltage is for a larger path tolerance; None without one, or one too small."""
+    """Decrease of the least voltage per path tolerance, V/m; None without a tolerance, or where it is too small."""
     if asked.tolerance is None:
         return None
     prices = float(least.prices["error"].sum() + least.prices["curving"].sum() / asked.tolerance.time**2)
@@ -288,7 +291,7 @@ def price_of_tolerance(asked: Transition, least: Tracked) -> float | None:
 
 
 def slowest(linear: Linearisation) -> float:
-    """Size of the real part, 1/s, of the slowest zero where the path begins or ends; 0 without any but vibrations."""
+    """Size of the real part, 1/s, of the slowest zero where the path begins or ends; 0 if all are vibrations."""
     sizes = np.abs(linear.zeros.real[[0, -1]])[~linear.is_light[[0, -1]]]
     return float(sizes.min()) if sizes.size else 0.0
 
@@ -309,7 +312,7 @@ def _lower_order(servo: Servo) -> float:
 
 
 def rough_ends(targets: Sequence[TimeFunction], end: float) -> Iterator[str]:
-    """A warning for a path to its `end` (s) whose acceleration or jerk jumps where it begins or ends."""
+    """Yield a warning if the acceleration or jerk of a path (`targets`) jumps where it begins, or ends at `end`, s."""
     ends = dict(zip(("where it begins", "where it ends"), np.round(_path_orders(targets, end)), strict=True))
     for order, name, cost in (
         (2, "acceleration", "no voltage without jumps makes up for that"),
@@ -320,10 +323,10 @@ def rough_ends(targets: Sequence[TimeFunction], end: float) -> Iterator[str]:
 
 
 def check_ends_for_gears(servo: Servo) -> float:
-    """The power of time with which the path begins and ends, the lower of both.
+    """The lower of the powers of time with which the path begins and ends.
 
-    Raises `InputError` where it is not smooth enough for motors behind compliant gears: at rest a gear has no rate, nor
-    has τ_s, of which ÿ is a part.
+    Raises `InputError` where it is not smooth enough for motors behind compliant gears: torques of gears, which contain
+    the path's acceleration, have to begin and end with rate 0.
     """
     for text in rough_ends(servo.functions, servo.end):
         raise InputError(
@@ -335,9 +338,9 @@ def check_ends_for_gears(servo: Servo) -> float:
 
 
 def singular_times(servo: Servo, linear: Linearisation) -> Iterator[str]:
-    """Where the modal inertia with free motors changes its sign, and the remedy.
+    """Yield when the determinant of the modal inertia with free motors changes its sign, and a remedy.
 
-    That is a rotor without which its sign stays, or else less mass; other modes may help.
+    The remedy names a rotor without which the sign stays, or else less mass; other modes may help.
     """
     for k in linear.singular_after[:1]:
         names = [node.joint.name for node in servo.model.tree.nodes if rotor(node)[0]]

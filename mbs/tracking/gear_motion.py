@@ -1,9 +1,7 @@
 """Twists of compliant gears and torques of motors behind them, of a motion that carries the path: exact by intervals.
 
-A spline through outputs would make pulses of what jumps in δ̈. Instead p(t) has four continuous derivatives, as a
-quintic spline through the breaks of the optimum, and the voltages make up for what that leaves on modes: for all of it
-where patches reach all modes, and p is a flat output (Fliess et al., Int. J. Control 61, 1995). On each interval
-torques are then polynomials, and so is δ but for c e^{−K t/D}.
+As in docs/theory.md, Motors and patches together: p(t) is a quintic spline through the breaks of the optimum, and
+voltages make up for residual modal forces (flat outputs: Fliess et al., Int. J. Control 61, 1995).
 """
 
 from collections.abc import Iterator
@@ -46,10 +44,10 @@ EXPONENTIAL: Array = np.polynomial.Polynomial.fit(  # type: ignore[no-untyped-ca
 def within_limits(
     asked: Transition, limits: Limits, meshes: tuple[Array, Array], near: Tracked, *, tolerance: float, step: float
 ) -> Tracked:
-    """The motion `asked` for behind its gears; its limits shrink by what exceeds `limits` between Gauss points.
+    """The motion `asked` for with compliant gears, within `limits`, or else the motion that exceeds these least.
 
-    Where that does not do, the motion that exceeds them least. The second one of the `meshes` (breaks, s) is coarser,
-    for where the first has no solution; `tolerance` is of forces left on modes, `step` (s) that of outputs.
+    Limits of the problem are reduced by excesses between Gauss points. `meshes` (breaks, s): the second is coarser, for
+    cases without solution on the first; `tolerance`: relative residual force on modes; `step` (s) of outputs.
     """
     near, wanted = _without_jumps(asked, meshes, near, tolerance), replace(asked, limits=limits)
     found, power, now = list[tuple[float, Tracked]](), SHRUNK[1], asked
@@ -95,7 +93,7 @@ def _without_jumps(asked: Transition, meshes: tuple[Array, Array], near: Tracked
 
 
 def behind_gears(asked: Transition, tracked: Tracked, step: float) -> Tracked:
-    """The motion of `tracked` with its gears; it goes on until damped ones have come to rest, by whole steps (s)."""
+    """The motion `tracked` with its gears, extended by multiples of `step` (s) until damped gears are at rest."""
     driven, gears = asked.driven, asked.gears
     assert isinstance(driven, GearedServo)
     assert gears is not None
@@ -136,10 +134,10 @@ def behind_gears(asked: Transition, tracked: Tracked, step: float) -> Tracked:
 
 
 def smooth(asked: Transition, tracked: Tracked) -> Tracked:
-    """The motion with p as a quintic spline at rest at both ends, and voltages that leave least on modes.
+    """The motion with p as a quintic spline at rest at both ends, and voltages for least residual forces on modes.
 
-    Its third derivative is zero there, in place of a condition at the breaks next to the ends: else δ̈ would jump, and
-    its reaction on a link with a gear of its own, whose motor would need an impulse.
+    Its third derivative is zero at the ends, in place of conditions at the breaks next to them: else δ̈ would jump, and
+    with it the reaction on a link with a gear of its own, whose motor would need an impulse.
     """
     breaks = tracked.voltage.x
     still = [(order, np.zeros(len(asked.Phi_V))) for order in (1, 2, 3)]
@@ -156,7 +154,7 @@ def smooth(asked: Transition, tracked: Tracked) -> Tracked:
 
 
 class Shares(NamedTuple):
-    """Of limits, the most that a motion reaches at any time; `peak_times` (motors,), s, are those of torques."""
+    """Largest shares of limits in a motion, with the times `peak_times` (motors,), s, of the largest torques."""
 
     voltage: float  # of sizes where patches have no limits
     torques: Array  # (motors,), 0 of motors without a limit
@@ -164,9 +162,9 @@ class Shares(NamedTuple):
 
 
 def largest_shares(asked: Transition, tracked: Tracked) -> Shares:
-    """What voltages and torques of motors reach at many points of each interval.
+    """Largest shares of limits that voltages and torques of motors reach at many points of each interval.
 
-    Torques of motors behind gears contain what accelerates their rotors ahead of the joint.
+    Torques of motors behind gears accelerate their rotors, too.
     """
     gears, count = asked.gears, len(asked.limits.torque)
     assert gears is not None
@@ -184,7 +182,7 @@ def largest_shares(asked: Transition, tracked: Tracked) -> Shares:
 
 
 def torques_beyond(model: Model, shares: Shares) -> Iterator[str]:
-    """Warnings on motors whose torques exceed their limits between the points at which these are constraints."""
+    """Yield warnings on motors whose torques exceed their limits between the points at which these are constraints."""
     names = motor_names(model)
     for k in np.flatnonzero(shares.torques > 1.0):
         yield (

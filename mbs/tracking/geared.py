@@ -1,9 +1,7 @@
-"""The robot on its path with motors behind compliant gears: what gears transmit beside what motors would do without.
+"""The robot on its path with motors behind compliant gears: torques that these transmit, and those of motors.
 
-Links do not feel the gear of a motor: with its rotor as behind a rigid gear the same p(t) and V(t) carry them (Spong,
-J. Dyn. Syst. Meas. Control 109, 1987). The gear transmits τ_s, the torque of a rigid gear without its own rotor. Its
-twist is that of K δ + D δ̇ = τ_s, and the motor supplies I δ̈ more, I = J N². The moment J N δ̈ on the body that carries
-the rotor is 1/N of that: with twists that are found without it, voltages and torques make up for it.
+docs/theory.md, Motors and patches together. A gear transmits τ_s = K δ + D δ̇, the torque of a rigid gear without its
+own rotor, and the motor supplies I δ̈ more, I = J N².
 """
 
 import copy
@@ -29,7 +27,7 @@ SAME = 1e-8  # of the largest torque of its motor, these two
 
 @struct
 class Gears:
-    """Compliant gears (k,): `columns` among all motors, K (N·m/rad), D (N·m·s/rad) and I = J N² (kg·m²)."""
+    """Compliant gears (k,): numbers `columns` among motor torques, K (N·m/rad), D (N·m·s/rad), I = J N² (kg·m²)."""
 
     joints: tuple[str, ...]
     columns: Indices
@@ -40,9 +38,9 @@ class Gears:
 
 @struct
 class GearedServo(Servo):
-    """A path's robot whose torques (N, motors + k), N·m, are those of motors with rigid gears, then those of the gears.
+    """A robot on its path with k compliant gears: torques (N, motors + k), of motors with rigid gears, then of gears.
 
-    `without` (k,) are the same robots, each without the rotor of one gear.
+    `without` (k,) are the same robot without the rotor of one gear each.
     """
 
     _: KW_ONLY
@@ -50,7 +48,7 @@ class GearedServo(Servo):
     without: tuple[Servo, ...]
 
     def forces(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array]:
-        """R (N, n), N/√kg, and torques (N, motors + k)."""
+        """Residual modal forces r (N, n), N/√kg, and torques (N, motors + k), N·m or N."""
         r, tau = super().forces(times, p, v, a)
         of_gears = [
             servo.motion.motion(times.tolist(), p, v, a, self.postures(times)).tau[:, [column]]
@@ -59,7 +57,7 @@ class GearedServo(Servo):
         return r, np.hstack([tau, *of_gears])
 
     def slopes(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
-        """Derivatives (N, n + motors + k, n) by p̈, ṗ and p."""
+        """Derivatives (N, n + motors + k, n), SI units, of (r, τ) of `forces` by p̈, ṗ and p."""
         found = [super().slopes(times, p, v, a)]
         for servo, column in zip(self.without, p.shape[1] + self.gears.columns, strict=True):
             M, D, K = servo.slopes(times, p, v, a)
@@ -68,9 +66,9 @@ class GearedServo(Servo):
         return M, D, K
 
     def reactions(self, times: Array, p: Array, v: Array, a: Array) -> Array:
-        """Forces on modes, and torques of motors (N, k, n + motors), by I δ̈ of each gear, of J N δ̈ on the carrier.
+        """Modal forces and motor torques (N, k, n + motors) that moments J N δ̈ of rotors on their carriers require.
 
-        A rotor enters them by its spin-up ψ̈, of which its own motor takes N times as much.
+        Per unit of I δ̈ of each of k gears, at `times` (N,), s.
         """
         M, shares = super().slopes(times, p, v, a)[0], list[Array]()
         for servo, column in zip(self.without, p.shape[1] + self.gears.columns, strict=True):
@@ -82,7 +80,7 @@ class GearedServo(Servo):
         return np.stack(shares, axis=1)
 
     def quasi_static(self, times: Array, p: Array) -> Array:
-        """Torques of motors alone (N, motors), N·m or N, at `times` (N,), s, and p (N, n)."""
+        """Torques of motors (N, motors), N·m or N, at `times` (N,), s, for constant p (N, n), m·√kg."""
         return super().quasi_static(times, p)[:, : -len(self.without)]
 
     def slowed(self, factor: float) -> Servo:
@@ -92,9 +90,9 @@ class GearedServo(Servo):
 
 
 def with_gears(servo: Servo) -> Servo:
-    """The same robot with what its compliant gears transmit; itself where all gears are rigid.
+    """The same robot with the torques of its compliant gears; itself where all gears are rigid.
 
-    Raises `InputError` for gears and motors that tracking does not take.
+    Raises `InputError` for gears and motors that `kind = "tracking"` does not support.
     """
     model = servo.model
     elastic = elastic_joints(model)
@@ -160,7 +158,7 @@ def _check_rotors(servo: GearedServo, ratios: Array) -> None:
 
 
 def motor_names(model: Model) -> list[str]:
-    """Joints of motors, one for each torque."""
+    """Names of the joints of motors, one for each torque."""
     return [joint for joint, columns in model.motors.items() for _ in columns]
 
 

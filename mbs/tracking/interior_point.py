@@ -1,8 +1,5 @@
 """Convex quadratic programs along a time axis, by a primal-dual interior point method.
 
-    min  Σ_k ½ z_kᵀ H_k z_k + g_kᵀ z_k        z_k = (x_k, the first r of x_{k+1}),  k = 0 … N−1
-    with F_k x_k + G_k x_{k+1} = c_k,   R_0 x_0 = e_0,   R_N x_N = e_N,   C_k z_k ≤ d_k
-
 Predictor and corrector are Mehrotra's (Nocedal and Wright, *Numerical Optimization*, ch. 16.6), with further
 correctors for longer steps (Gondzio, Comput. Optim. Appl. 6, 1996). Newton's equations in the order (R_0, x_0, λ_0,
 x_1, λ_1 …) are banded, and factorized with pivoting: growing and decaying solutions side by side need it.
@@ -31,9 +28,10 @@ SPREAD = 10.0  # of slack × z about their target, which no corrector changes
 
 @struct
 class Program:
-    """Quadratic program: H (N, s + r, s + r), g (N, s + r), F, G (N, e, s), c (N, e), C (N, i, s + r), d (N, i).
+    """Quadratic program along a time axis, in unknowns x_0 … x_N of length s and z_k = (x_k, the first r of x_{k+1}).
 
-    `start`, `end`: R (r, s) and e (r,).
+    min Σ_k ½ z_kᵀ H_k z_k + g_kᵀ z_k with F_k x_k + G_k x_{k+1} = c_k and C_k z_k ≤ d_k: H (N, s + r, s + r),
+    g (N, s + r), F, G (N, e, s), c (N, e), C (N, i, s + r), d (N, i). `start`, `end`: R, e of R x = e at x_0 and x_N.
     """
 
     H: Array
@@ -52,9 +50,9 @@ class Program:
 
 
 class Minimum(NamedTuple):
-    """x (N+1, s), the multipliers (N, i) ≥ 0 of C z ≤ d, and whether the method converged.
+    """Solution x (N+1, s) of a `Program`, multipliers (N, i) ≥ 0 of C z ≤ d, and whether the method converged.
 
-    `halfway`: slack, multipliers, and all unknowns less those of the minimum, where bounds are not reached yet.
+    `halfway`: slack, multipliers and distance of all unknowns from the minimum at an iteration inside the bounds.
     """
 
     x: Array
@@ -146,7 +144,7 @@ class _Equations:
 
 
 def minimize(program: Program, gap: float = GAP, near: Minimum | None = None) -> Minimum:
-    """Minimize to within `gap` of the value, starting from the solution `near` of a similar program."""
+    """Minimize to a relative duality gap of `gap`, starting from the solution `near` of a similar program."""
     way = _CentralPath(program, gap, near)
     halfway = way.slack, way.z, way.unknown
     for _ in range(MOST_ITERATIONS):

@@ -1,22 +1,10 @@
 """Motors and patches together on a path, within limits: an optimal control problem on the internal dynamics.
 
-With patches r(t, p, ṗ, p̈) = Φ_V V (`zero_dynamics`). p̈ is a polynomial on each interval through the four Gauss
-points of `collocation`, V is linear between breaks: limits at breaks are limits everywhere. Each Newton step solves
-
-    min  1/(t₁−t₀) ∫ ½ |τ − τ_qs|²/τ_ref² + ½ |V|²/V_ref² + ½ T_r² |V̇|²/V_ref² dt,
-    V_min ≤ V ≤ V_max, |V̇| ≤ s_max, |C V̇ + Φ_Vᵀ ṗ| ≤ i_max, |τ| ≤ τ_max
-
-or the least share of the limits of voltages, currents or torques, of the linearized equations; τ_qs carries the links
-as they sag. Links rest at both ends. Output transition with free internal states: Perez and Devasia, Automatica 39
-(2003).
-
-A motor behind a compliant gear supplies τ + I τ̈_s/K, with what the gear transmits, τ_s: there V̈ is linear between
-breaks, and T_r⁴|V̈|² takes the place of T_r²|V̇|².
-
-Within a path tolerance the path of points is y_d + e, and r and τ contain e, ė, ë as well: ë is linear between breaks,
-|e| ≤ e_max, |ë| ≤ e_max/T_e², e = ė = 0 at both ends. Without the limit of ë the error would jump to e_max at once.
-
-Intervals are graded at first, halved until the least voltage settles, cut until no force is left over.
+docs/theory.md, Motors and patches together, has the problem, with compliant gears and a path tolerance. Each Newton
+step solves its linearized equations for the least effort (43), or the least share of limits of voltages, currents
+(|C V̇ + Φ_Vᵀ ṗ| ≤ i_max) or torques. On each interval p̈ is a polynomial through the four Gauss points of `collocation`,
+V (with compliant gears V̈) and the path error's ë are linear. Intervals are graded at first, halved until the least
+voltage settles, divided until no residual force is left.
 """
 
 from dataclasses import replace
@@ -51,11 +39,11 @@ QUICKLY = 5e-3  # of the share by Newton's steps, on intervals that are to chang
 def track(
     asked: Transition, breaks: Array, near: Tracked | None = None, calm: float | None = None, within: float = TOLERANCE
 ) -> Tracked:
-    """Solve on `breaks` (N + 1,), from a motion `near`, or from links as they sag and no voltages.
+    """Solve on `breaks` (N + 1,), s, from a motion `near`, or from quasi-static links and no voltages.
 
-    Newton's method ends with a step `within` that share of the peaks.
-    With `calm`, such a share of the effort joins a least share, which a few steps find within `WHILE_SETTLING`. That of
-    voltages grows to one away from the ends: with equal weights, forces are left over between Gauss points (theory.md).
+    Newton's method ends with a step smaller than the share `within` of the peaks.
+    With `calm`, this share of the effort is added to the least share of limits, which is found within `WHILE_SETTLING`.
+    For voltages it grows to one away from the ends: else residual forces remain between Gauss points (theory.md).
     """
     if asked.tolerance is not None and near is None:  # exact tracking is a good start
         exact = track(replace(asked, tolerance=None), breaks, None, calm, within)
@@ -127,7 +115,7 @@ def graded(start: float, end: float, intervals: int) -> Array:
 
 
 def start_breaks(start: float, path_end: float, end: float, intervals: int) -> Array:
-    """Graded breaks (intervals + 1,), s, those next to 0 and `path_end` moved there."""
+    """Breaks (intervals + 1,), s, closer together at both ends; those next to 0 and `path_end` are moved there."""
     breaks = graded(start, end, intervals)
     for t in (0.0, path_end):
         breaks[np.abs(breaks - t).argmin()] = t
@@ -135,9 +123,9 @@ def start_breaks(start: float, path_end: float, end: float, intervals: int) -> A
 
 
 def refined(asked: Transition, breaks: Array, tolerance: float, near: Tracked) -> Tracked:
-    """The solution on `breaks` (N + 1,), s, cut until residual forces are below `tolerance` of the largest elastic one.
+    """The solution on `breaks` (N + 1,), s, divided until residual forces are below `tolerance`.
 
-    Nor are torques then further beyond the limits asked for than by half this share of them, where they are looked at.
+    `tolerance` is a share of the largest elastic force; at probes, torques exceed their limits by half of it at most.
     """
     tracked, within = near, tolerance**0.5  # Newton's next step is about the square of the last one
     while True:
@@ -165,12 +153,11 @@ def _left_over(asked: Transition, tracked: Tracked, tolerance: float) -> tuple[f
 
 
 def settled(asked: Transition, breaks: Array, to: float = SETTLED) -> Tracked:
-    """The least voltage, on intervals that are halved where V or ë turns until that changes it by at most `to`.
+    """The least voltage, on intervals that are halved where V or ë turns until it changes by at most the share `to`.
 
-    Both are linear on each interval: finer ones allow more of them, so that the least share falls. Where steps wander,
-    more of the effort joins it, on intervals that are all halved. All that converge count, and the least one is taken;
-    where much is `LOST` between Gauss points it is no motion and did not converge. Surely far beyond the limits it is
-    not refined.
+    V and ë are linear on each interval: on finer ones the least share falls. Where steps wander, more of the effort
+    joins it, on intervals that are all halved. The least of all solutions that converge is taken; one with much force
+    `LOST` between Gauss points did not converge. Far beyond the limits nothing is refined.
     """
     best, is_settled = _descend(asked, breaks, CALM[0], to)
     for calm in CALM[1:]:

@@ -33,10 +33,10 @@ BEND = 1e-5  # of the square of ë, relative to its limit, in the objective: it 
 
 @struct
 class Curves:
-    """Curves of `count` patches, V(t), or coordinates, e(t), whose derivative of `order` is linear between `breaks`.
+    """`count` voltages V(t), or path errors e(t), whose derivative of `order` is linear between `breaks` (N + 1,), s.
 
-    On an interval between breaks (N + 1,), s, they follow from that derivative at both ends, and from V and the lower
-    derivatives where it begins: `places` (order + 2,) are those of these among the `width` unknowns z of an interval.
+    On an interval they follow from this derivative at both ends, and from V and the lower derivatives at its start:
+    `places` (order + 2,) are the first numbers of these among the `width` unknowns z of an interval.
     """
 
     breaks: Array
@@ -46,7 +46,7 @@ class Curves:
     width: int
 
     def curve(self, u: Array) -> PPoly:
-        """V(t) by `u` (N + 1, count (order + 1)) at breaks: the linear derivative, then V and the lower ones."""
+        """V(t), V, by `u` (N + 1, count (order + 1)) at breaks: the linear derivative, then V and the lower ones."""
         linear, *lower = np.split(u, self.order + 1, axis=1)
         slope = np.diff(linear, axis=0) / (factorial(self.order + 1) * np.diff(self.breaks)[:, None])
         powers = [of[:-1] / factorial(k) for k, of in enumerate([*lower, linear])]
@@ -62,7 +62,7 @@ class Curves:
         return np.stack([constant - last, last, *lower], axis=2)
 
     def by_z(self, xi: Array, derivative: int = 0) -> Array:
-        """A derivative at shares ξ (S,) of intervals by z: (N, S, count, width)."""
+        """Matrices (N, S, count, width) from the unknowns z to a derivative at shares ξ (S,) of intervals."""
         parts, each = self._parts(xi, derivative), np.arange(self.count)
         by_z = np.zeros((*parts.shape[:2], self.count, self.width))
         for k, place in enumerate(self.places):
@@ -81,9 +81,9 @@ class Curves:
 
 @struct
 class Iterate:
-    """p, ṗ, V at breaks (N+1, …), p̈ at stages (N, 4, n) and σ, and the minimum they come from.
+    """p, ṗ = v, V and e at breaks (N+1, …), p̈ = K at Gauss points (N, 4, n), σ = `share`, and their minimum; SI units.
 
-    Behind gears V are V̈, V and V̇ side by side; e are ë, e and ė.
+    With compliant gears V are V̈, V and V̇ side by side; e are ë, e and ė. `moved`: size of the last step, relative.
     """
 
     p: Array
@@ -98,7 +98,7 @@ class Iterate:
     moved: float = np.inf
 
     def tracked(self, steps: "Steps") -> Tracked:
-        """Return this as piecewise polynomials."""
+        """Return the motion as piecewise polynomials, with cost and prices by the last program of `steps`."""
         assert self.found is not None
         breaks, steps.sigma = steps.breaks, self.share
         cost = steps.cost(self.found)
@@ -121,12 +121,12 @@ class Iterate:
 class Steps:
     """Newton's steps, each the minimum of the linearized problem in x = (V, p, ṗ, σ) at breaks.
 
-    What happens between two breaks depends on z_k = (x_k, V_{k+1}). Behind gears x = (V̈, p, ṗ, V, V̇, σ), and V̈ takes
-    the place of V there.
+    The motion between two breaks depends on z_k = (x_k, V_{k+1}). With compliant gears x = (V̈, p, ṗ, V, V̇, σ), and
+    z_k = (x_k, V̈_{k+1}).
 
-    σ, the share of limits, is a constant, and there where it is the objective. A little of the effort then picks one of
+    σ is the constant share of limits, an unknown where it is the objective. A little of the effort then picks one of
     many V(t); where Newton's steps would wander among them, enough of it for steps that shrink, and then less.
-    Steps of the effort leave out how constraints curve; where that matters they need not shrink, and are damped.
+    Steps of the effort leave out the curvature of constraints; where that matters they need not shrink, and are damped.
     """
 
     program: Program
@@ -161,7 +161,7 @@ class Steps:
         self.unit_z = np.concatenate([self.unit, control])
 
     def take(self, now: Iterate) -> Iterate:
-        """The next values at breaks and stages, and the minimum they come from."""
+        """The iterate after the Newton step from `now`, with the minimum it comes from."""
         n, x = self.n, self._at_breaks(now)
         z, (N, s, _) = self._z(x), now.K.shape
         states = [*stage_states(GAUSS, self.h, now.p, now.v, now.K), now.K]
@@ -372,6 +372,6 @@ class Steps:
         return prices
 
     def cost(self, found: Minimum) -> float:
-        """J, with what `of_voltages` adds."""
+        """Value J of the effort at `found`, with voltages weighted by `of_voltages`."""
         (H, g, constant), z = self.effort, self.program.z(found.x)
         return float((z * (0.5 * (H @ z[..., None])[..., 0] + g)).sum()) + constant

@@ -1,8 +1,8 @@
 """Motors and patches carry the robot along its path together, within their limits: `kind = "tracking"`. SI units.
 
-The problem, its discretization and its solver are in `mbs.tracking.problem`. First comes the least voltage with which
-patches can do it; where that is within their limits, the motion of least effort follows. What each zero requires, and
-what would do beyond limits, is in `advice`; a simulation under torques alone shows whether patches are needed.
+The problem and its solver are in `mbs.tracking.problem`. First comes the least voltage with which patches can do it;
+where that is within their limits, the motion of least effort follows. A simulation under torques alone shows whether
+patches are needed.
 """
 
 import time
@@ -186,16 +186,16 @@ class TrackedPath(AroundPath):
     least_voltage: float  # V, the largest voltage that is needed at least, of the patch next to its limit
     least_voltage_doubt: float  # V, by how much a finer mesh may change it, estimated; infinite where it did not settle
     least_share: float  # the same as a share of the limits; NaN where no patch has any
-    objective: Objective  # what was made small: voltage instead of what is asked beyond limits, or if none is needed
+    objective: Objective  # "least-voltage" in place of that of the scene beyond limits, and if no voltage is needed
     cost: float  # the effort, without unit
-    unmet: float  # see `Tracked`
+    unmet: float  # largest residual modal force between Gauss points, relative to the largest elastic one
     bounds: Bounds | None  # what each zero requires, V; None where motors alone have no bounded motion
     prices: Mapping[str, Mapping[str, Array]]  # `Tracked.prices` by kind, then by body, of torques by joint
     path_tolerance: float | None  # m, by which coordinates of points may be off their path
     tolerance_price: float | None  # V/m, by how much less the least voltage is for a larger path tolerance
-    # m or rad, how far off the path the same torques alone are at most; NaN where not found
+    # largest deviation from the path with the same torques but no voltages, m or rad; NaN where not found
     without_patches: float = np.nan
-    is_needed: bool = True  # whether that is more than the tolerance times the path's way
+    is_needed: bool = True  # whether `without_patches` is more than the tolerance times the path's way
 
 
 def least_voltage(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking) -> tuple[float, float]:

@@ -33,7 +33,7 @@ class Limits:
 
 @struct
 class Weights:
-    """τ_ref (N·m), V_ref (V) and T_r (s)."""
+    """Sizes that weigh equally in the effort: torque τ_ref (N·m), voltage V_ref (V), and time T_r = V/V̇ (s)."""
 
     torque: float
     voltage: float
@@ -42,7 +42,7 @@ class Weights:
 
 @struct
 class Tolerance:
-    """Largest error (m) of each coordinate of points, and T_e (s): |e| ≤ error, |ë| ≤ error/T_e²."""
+    """Path tolerance of each coordinate of points, `error` (m) and `time` T_e (s): |e| ≤ error, |ë| ≤ error/T_e²."""
 
     error: float
     time: float = TIME
@@ -54,27 +54,28 @@ class Tolerance:
 
 
 def rows_of_points(servo: Servo) -> Indices:
-    """Which constraint equations prescribe coordinates of points, m."""
+    """Numbers of the constraint equations that prescribe coordinates of points, m."""
     rows = servo.model.rows
     return np.flatnonzero([row.is_trajectory and row.kind == "point" and row.target is not None for row in rows])
 
 
 @struct
 class Transition:
-    """Boundary conditions: `rest` is p at both ends; `is_free` whether V, or V̈, may start and end at any value.
+    """A tracking problem: the robot on its path, `driven`, from rest to rest with m patches, within limits.
 
-    `rate` is that of the slowest zero, 1/s: voltages matter less by e^{−rate t} at the time t from the nearer end.
+    `rest`: p (n,), m·√kg, at both ends; `is_free`: V, or V̈ with compliant gears, may start and end at any value.
+    `rate`, 1/s, of the slowest zero: voltages matter less by e^{−rate t} at the time t from the nearer end.
     """
 
     driven: Servo
-    Phi_V: Array  # (n, m)
+    Phi_V: Array  # (n, m) modal forces per voltage, N/(√kg·V)
     limits: Limits
     weights: Weights
     rest: tuple[Array, Array]
     objective: Objective = "effort"
     is_free: bool = False
     rate: float = 0.0
-    gears: Gears | None = None  # those that give; V then begins and ends at zero, with its rate
+    gears: Gears | None = None  # compliant ones; V then begins and ends at zero, with its rate
     tolerance: Tolerance | None = None  # within which points may leave their path; e = ė = 0 at both ends
 
     @property
@@ -104,7 +105,7 @@ class Transition:
 
     @property
     def ranges(self) -> dict[str, Array]:
-        """Least and largest values (2, …), SI units, by which shares count: limits, or sizes where there are none."""
+        """Least and largest values (2, …), SI units, by kind, to which shares refer: limits, or else `weights`."""
         of, weights, both = self.limits.patches, self.weights, np.array([[-1.0], [1.0]])
         rate = weights.voltage / (weights.rate or RATE)
         pairs = {
@@ -122,7 +123,7 @@ class Transition:
 
 @struct
 class Tracked:
-    """p(t) and V(t) as piecewise polynomials, and how they were found."""
+    """Solution of a `Transition`: p(t), m·√kg, and V(t), V, as piecewise polynomials, and how they were found."""
 
     curve: PPoly
     voltage: PPoly
@@ -130,29 +131,29 @@ class Tracked:
     iterations: int
     share: float  # σ, the least share of limits (`objective` "least-…"), or of V_ref or τ_ref where there are none
     cost: float  # J; 0 where it is not the objective
-    # by how much less J, or σ, is for limits that are wider by one: "voltage", "slew" and "current" of patches (m,),
-    # 1/V, s/V, 1/A, and "torque" of motors (motors,) 1/(N·m) or 1/N; zero where a limit is not reached
+    # decrease of J, or σ, per unit of limits: "voltage", "slew" and "current" of patches (m,), 1/V, s/V, 1/A, and
+    # "torque" of motors (motors,) 1/(N·m) or 1/N; zero where a limit is not reached
     prices: dict[str, Array]
-    objective: Objective  # what was made small
-    # largest force on modes that nobody supplies between Gauss points, relative to the largest elastic one
+    objective: Objective
+    # largest residual modal force between Gauss points, relative to the largest elastic one
     unmet: float = np.nan
     # step, found: the last Newton step, relative, and its minimum; the next step is about the square of it
     step: float = np.inf
     found: Minimum | None = None
     added: float = 0.0  # what the effort adds to the objective "least-…"
-    gears: Mapping[str, GearCurve] = field(default_factory=dict)  # by joint, behind which motors are
+    gears: Mapping[str, GearCurve] = field(default_factory=dict)  # compliant ones, by joint
     error: PPoly | None = None  # e(t), m, of points that may leave their path
     # of the share, relative: twice its change by the last finer intervals, and what the effort may add
     doubt: float = np.inf
 
     @property
     def surely(self) -> float:
-        """Lower bound of the share, within its uncertainty; 0 if that is unknown."""
+        """Lower bound of the share, by its uncertainty `doubt`; 0 if that is unknown."""
         return max(0.0, self.share * (1.0 - self.doubt)) if np.isfinite(self.doubt) else 0.0
 
 
 def displaced_at(servo: Servo, times: Array, off: Array) -> Servo:
-    """The robot with points off their paths by e, ė, ë (3, T, k), SI units, at just these ascending `times` (T,), s."""
+    """The robot with coordinates of points off their paths by e, ė, ë: `off` (3, T, k), SI, only at `times` (T,), s."""
     times, first = np.unique(times, return_index=True)
     breaks, off = np.append(times, times[-1] + 1.0), off[:, first]
 
@@ -164,16 +165,16 @@ def displaced_at(servo: Servo, times: Array, off: Array) -> Servo:
 
 
 def displaced_along(servo: Servo, error: PPoly) -> Servo:
-    """The robot with points off their paths by `error` (k,), m, up to round-off: quintic Hermite pieces."""
+    """The robot with k coordinates of points off their paths by `error`(t) (k,), m, as quintic Hermite pieces."""
     times = np.union1d(error.x, np.linspace(error.x[0], error.x[-1], PIECES + 1))
     off = np.array([error(times, order) for order in range(3)])
     return _with_targets(servo, lambda target, k: through(times, target.sample(times) + off[:, :, k]))
 
 
 def forces_off_path(servo: Servo, times: Array, motion: Sequence[Array], off: Array) -> tuple[Array, Array]:
-    """(r, τ) (T, n + torques) with e, ė, ë `off` (3, T, k) at `times` (T,), s, and their slopes (3, T, n + torques, k).
+    """(r, τ) (T, n + torques) with e, ė, ë = `off` (3, T, k) at `times` (T,), s, and slopes (3, T, n + torques, k).
 
-    By differences, which are exact for ë and off by about `NEAR` for e and ė.
+    `motion`: p, ṗ, p̈ (T, n); SI units. Differences are exact for ë, and for e and ė to about `NEAR`.
     """
     now = np.hstack(displaced_at(servo, times, off).forces(times, *motion))
     slopes, size = np.zeros((3, *now.shape, off.shape[2])), NEAR * servo.model.size
