@@ -61,7 +61,7 @@ class Fcid(TimedAnalysis):
         return self
 
     def prescribed(self) -> Iterator[tuple[str, TimeFunction, int]]:
-        """Yield the functions of the given shape, with their labels."""
+        """Yield key, function and number of derivatives (2) of each modal coordinate of the given shape."""
         for body, functions in (self.modal or {}).items():
             for k, function in enumerate(functions):
                 yield f"modal.{body}[{k}]", function, 2
@@ -133,19 +133,19 @@ def _shape(context: Context, analysis: Fcid, model: Model, motion: PrescribedMot
 
 
 def shape_nodes(analysis: Fcid) -> Array:
-    """Times (T,), s, between which shapes are splines."""
+    """Times (T,), s, at which splines through shapes have nodes."""
     return np.linspace(0.0, analysis.end, max(FEWEST_NODES, len(analysis.times) // 2 + 1))
 
 
 def sampled(shape: Shape, times: Array) -> Array:
-    """p, ṗ and p̈ (3, T, n), √kg·m and s, of all bodies."""
+    """p, ṗ and p̈ (3, T, n), √kg·m and s, of the n modes of all bodies at `times` (T,), s."""
     functions = [function for of_body in shape for function in of_body]
     samples = np.array([function.sample(times) for function in functions]).reshape(len(functions), 3, len(times))
     return np.ascontiguousarray(np.moveaxis(samples, 0, -1))
 
 
 def given_shape(scene_path: Path, bodies: Bodies, analysis: Fcid) -> Shape:
-    """Modal motions from the scene's expressions, by body; as splines where payloads or patches changed the modes."""
+    """p(t) of each body, √kg·m, by the scene's expressions; as splines where payloads or patches changed the modes."""
     given: Mapping[str, tuple[TimeFunction, ...]] = analysis.modal or {}
     shape: Shape = []
     for body in bodies:

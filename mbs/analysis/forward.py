@@ -64,10 +64,10 @@ class Forward(ActuatedAnalysis):
         return self
 
     def run(self, context: Context) -> Run:
-        """Motion alone: nothing is specified. With an actuation it starts where the earlier analysis did.
+        """Motion under loads and `actuation`, without trajectories; with an actuation, from the start of that analysis.
 
-        Raises `InputError` where what is to be applied does not fit the robot, `SolveError` where there is no
-        equilibrium to start from.
+        Raises `InputError` where forces to apply do not fit the robot, `SolveError` where there is no equilibrium to
+        start from.
         """
         model, progress = with_compliance(context.model.without_paths()), context.progress
         if self.actuation is None:
@@ -103,13 +103,13 @@ class Forward(ActuatedAnalysis):
         return run
 
     def needs(self) -> Iterator[Need]:
-        """The patches or points that its forces act through."""
+        """Yield the scene's tables that the analysis requires: of patches or actuation points, by `apply`."""
         table = {"joints+pzt": "pzt", "points": "actuation_points"}.get(self.apply or "")
         if self.apply is not None and table is not None:
             yield Need("apply", self.apply, table)
 
     def replay_problems(self, source: Analysis) -> Iterator[str]:
-        """Check that `source` computes the forces to apply."""
+        """Yield a message if `source` does not compute the forces to apply."""
         if source.applicable and self.apply not in source.applicable:
             more = f': "{source.name}" takes more than the forces on its trajectories'
             why = more if self.apply == "trajectory" else ""
@@ -138,13 +138,13 @@ def _replayed(context: Context, model: Model, source: Run, analysis: Forward) ->
 
 
 def actuator_commands(model: Model, patches: Mapping[str, PatchedLink]) -> tuple[Command, ...]:
-    """The effect of a unit command of motors, on sections or frames, and of patches, on link modes."""
+    """Generalized forces of unit commands: of motors, N·m or N, on sections or frames; of patches, V, on link modes."""
     of_volts = (row for of_link in patches.values() for row in model.modal_directions(of_link.per_volt))
     return (*motor_commands(model), *map(Command, of_volts))
 
 
 def numbers_of_motors(model: Model) -> dict[str, list[int]]:
-    """Indices of motor coordinates by joint, one joint after the other."""
+    """Numbers of motor commands by joint, one joint after the other."""
     numbers = count()
     return {joint: [next(numbers) for _ in columns] for joint, columns in model.motors.items()}
 
@@ -180,13 +180,13 @@ def _behind_gears(source: Run, model: Model, analysis: Forward, context: Context
 
 
 def command_ranges(model: Model, patches: Mapping[str, PatchedLink]) -> Array:
-    """Limits (2, inputs), lowest and highest: motors N·m or N, patches V; infinite if none."""
+    """Limits (2, inputs) of commands, lowest and highest: of motors, N·m or N, then of patches, V; infinite if none."""
     most = largest_moments(model, limits=True)
     return np.hstack([np.stack([-most, most]), joined(patches.values()).range])
 
 
 def strain_directions(model: Model, patches: Mapping[str, PatchedLink]) -> Array:
-    """(k, n_v), the current Φ_Vᵀ ṗ of all patches by v, A."""
+    """Matrix (k, n_v) from v (n_v,), SI units, to the currents Φ_Vᵀ ṗ, A, of all k patches."""
     rows = [model.modal_directions(of_link.per_volt) for of_link in patches.values()]
     return np.concatenate([np.zeros((0, model.tree.n_v)), *rows])
 

@@ -28,7 +28,7 @@ from ..scene.analysis import Analysis, Surroundings, TimedAnalysis
 
 
 def run_static(context: Context, analysis: Analysis) -> Run:
-    """The equilibrium at the one time t = 0: at rest, however fast the trajectories are there.
+    """The equilibrium at t = 0, with v = a = 0 even where trajectories move then.
 
     Raises `SolveError` where there is none.
     """
@@ -68,21 +68,21 @@ class InstantAnalysis(Analysis):
 
     @property
     def times(self) -> Array:
-        """The instants (T,), s; 0 where none are given."""
+        """The instants (T,), s; [0] where none are given."""
         return np.zeros(1) if self.instants is None else np.array(self.instants)
 
     @property
     def source(self) -> str | None:
-        """Name of the analysis it is about; None for the equilibrium."""
+        """Name of the earlier analysis; None for the equilibrium."""
         return None if self.about == STATIC else self.about
 
     @property
     def needs_times(self) -> bool:
-        """Whether a motion is of use only at given times."""
+        """Whether `times` have to be given with an earlier analysis."""
         return True
 
     def problems(self, among: Surroundings) -> Iterator[str]:
-        """Whether there is such a motion, and times that fit it."""
+        """Yield a message if there is no such earlier motion, or `times` do not fit it."""
         if self.source is None:
             if self.instants is not None:
                 yield f'times: expected none about "{STATIC}", found {quoted(f"{t:g}" for t in self.instants)}'
@@ -101,12 +101,12 @@ class InstantAnalysis(Analysis):
 
 
 class OperatingPoints(NamedTuple):
-    """States about which a robot is linear.
+    """States about which a robot's equations are linearized.
 
     Attributes:
         model: without trajectories, with compliant gears where the scene has them.
         time: (T,) s.
-        q, v, a: (T, n_q), (T, n_v), (T, n_v).
+        q, v, a: (T, n_q), (T, n_v), (T, n_v), SI units.
     """
 
     model: Model
@@ -117,9 +117,9 @@ class OperatingPoints(NamedTuple):
 
 
 def find_operating_points(context: Context, analysis: InstantAnalysis) -> tuple[Run, OperatingPoints]:
-    """The equilibrium, or the instants of a motion, that an analysis is about, as they were found, and their states.
+    """The run, equilibrium or earlier motion, that `analysis` linearizes about, and the states at its instants.
 
-    In the equilibrium motors keep the initial posture where nothing is followed.
+    In the equilibrium of a scene without trajectories motors keep the initial posture.
     """
     if analysis.source is None:
         model = context.model
@@ -143,8 +143,7 @@ def linear_states(model: Model, source: Run, rows: Sequence[int]) -> OperatingPo
 def open_loop_growth(run: Run) -> float:
     """Mean over a run of the fastest growth, 1/s, of small deviations where its torques act open loop.
 
-    By linear models about `INSTANTS` of the run; 0 where none of them has a pole that grows; nan where the robot has no
-    linear model.
+    By linear models about `INSTANTS` of the run; 0 where none has an unstable pole; nan where there is no linear model.
     """
     first, last = run.time[[0, -1]]
     rows = [int(np.abs(run.time - t).argmin()) for t in np.linspace(first, last, INSTANTS)]
@@ -163,8 +162,8 @@ def open_loop_growth(run: Run) -> float:
 def places_of(context: Context, points: Sequence[str] | None, *, loaded: bool = False) -> dict[str, str]:
     """Map points of the scene to points of the model, which may contain links in pieces.
 
-    Where no `points` are given: those of trajectories, or else the tips of all bodies that have one; then tools, and
-    where payloads and loads are if `loaded`.
+    Where no `points` are given: those of trajectories, or else the tips of all bodies; also tools, and if `loaded` the
+    points of payloads and loads.
     """
     whole = context.whole
     if points is None:
@@ -179,13 +178,13 @@ def places_of(context: Context, points: Sequence[str] | None, *, loaded: bool = 
 
 
 def of_earlier(source: Run, analysis: Analysis) -> Run:
-    """The motion of `source` as that of `analysis`, which has made no steps of its own."""
+    """The motion of `source` as a run of `analysis`, with statistics of no steps."""
     statistics = replace(source.statistics, steps=0, evaluations=0, wall_seconds=0.0, warnings=())
     return replace(source, analysis=analysis, statistics=statistics, prescribed=None, look_closer=None)
 
 
 def row_at(path: Path, analysis: Analysis, source: Run, t: float) -> int:
-    """The output of an earlier analysis at time t. Raises `InputError` where there is none."""
+    """Number of the output of an earlier analysis at t, s. Raises `InputError` where there is none."""
     row = int(np.abs(source.time - t).argmin())
     if abs(source.time[row] - t) > NEAR * source.analysis.last_time:
         every = f"every {source.analysis.output_step:g} s " if isinstance(source.analysis, TimedAnalysis) else ""
@@ -199,7 +198,7 @@ def row_at(path: Path, analysis: Analysis, source: Run, t: float) -> int:
 
 @struct
 class RobotAtRest(Details):
-    """Natural frequencies and compliance in the equilibrium, by condition of its joints: see `joint_conditions`."""
+    """Natural frequencies and compliance in the equilibrium at t = 0, by condition: joints "locked" or "compliant"."""
 
     conditions: tuple[Mapping[str, JointCondition], ...]
     times = (0.0,)
@@ -220,7 +219,7 @@ class Static(Analysis):
     refers_to = (("points", "body"),)
 
     def run(self, context: Context) -> Run:
-        """Motion and forces at t = 0."""
+        """Posture and forces at t = 0, with frequencies and compliance; raises `SolveError` without an equilibrium."""
         run = run_static(context, self)
         try:
             model, _, (q,), (v,), (a,) = linear_states(context.model, run, [0])

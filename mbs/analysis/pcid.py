@@ -26,7 +26,7 @@ class Pcid(IntegratedAnalysis):
     applicable = ("joints", "joints+pzt", "trajectory", "points")
 
     def run(self, context: Context) -> Run:
-        """C_m and C_s hold, p is free; and compliant gears, where motors follow the trajectories.
+        """Integrate under constraints of joints and trajectories; modes are free, and gears whose motors follow paths.
 
         Raises `SolveError` where there is no equilibrium to start from.
         """

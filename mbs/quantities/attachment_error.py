@@ -1,12 +1,8 @@
-"""What too few eigenmodes make of a run, as attachment modes tell it. SI units.
+"""Errors of too few eigenmodes, estimated by attachment modes, and of chains of stiffened pieces. SI units.
 
-What a chain of stiffened pieces misses: by how much rods with the strains of its pieces end elsewhere.
-
-The equations know where the ends of a piece are to second order in its modal coordinates p (`model.body`);
-its energy is that of the curvatures (Φ_r p)' and of the stretch and shear of Φp. A rod of the same strains, and so of
-the same energy, ends where its sections, each turned from the last, take it (Simo, Comput. Methods Appl. Mech. Eng. 49,
-1985). The difference of the ends, carried to the end of the chain, is the estimate: it is of third order, and needs no
-measured factor. What bending in one plane, at whatever angle, leaves is far less than what bending in two or twist do.
+The ends of a piece are in its equations to second order in its modal coordinates p (`model.body`). A rod with the same
+strains ends where its sections, each turned from the last, take it (Simo, Comput. Methods Appl. Mech. Eng. 49, 1985).
+The difference of the ends, carried to the end of the chain, is the estimate: docs/theory.md, Limits.
 """
 
 from collections.abc import Mapping
@@ -27,9 +23,9 @@ JOLT = 0.01  # of the largest deformation: where more begins to ring at once, mo
 
 
 class Start(NamedTuple):
-    """Initial state of a run in natural sizes: M (n_v, n_v), C_q (rows, n_v) and accelerations (n_v,) there.
+    """Start of a run in natural sizes: M (n_v, n_v), gradients C_q (constraints, n_v), accelerations a (n_v,).
 
-    K (n_v,), D (n_v, n_v) and `late` (n_v,) of `mode_error`, s², are those of modal coordinates, and 0 of others.
+    K (n_v,), D (n_v, n_v) and `late` (n_v,), 1/ω_m² − 1/ω² of `mode_error`, s², are 0 except for modal coordinates.
     """
 
     M: Array
@@ -43,16 +39,15 @@ class Start(NamedTuple):
 
 
 def mode_error(run: Run) -> float | None:
-    """Estimated error of torques, reactions and deflections for too few modes, of their peaks; None: nothing is known.
+    """Estimated error of torques, reactions and deflections for too few modes, as a share of their peaks.
 
-    Attachment modes carry what the eigenmodes left out do statically. What these do besides, by their inertia, is
-    about as if they vibrated at ω_m, where the first of them is: between the highest eigenmode kept, ω_k, and the
-    lowest attachment mode above it, ω_a (Rayleigh); ω_m² = ω_k ω_a. So δp = (1/ω_m² − 1/ω²) p̈, and no more than they do
-    at all: the largest p counts where attachment modes ring at their own ω, as after a jump of the acceleration. The
-    estimate is the largest √(δpᵀ K δp) of a link against the largest √(pᵀ K p). What rings from the start on gets out
-    of step besides: `start_errors`. Both together are 0.2 to 5 times the error of the worst torque of arms with two or
-    more modes, up to 10 times it with one (tests/mbs/test_mode_error.py). What bends a link across the axes of all
-    motors counts too: reactions feel it, motors do not. Nothing is known of links without attachment modes.
+    None for links without attachment modes. These contain the static part of the eigenmodes that are left out. The
+    dynamic part is about that of a vibration at ω_m between the highest eigenmode kept, ω_k, and the lowest attachment
+    mode above it, ω_a (Rayleigh): ω_m² = ω_k ω_a. So δp = (1/ω_m² − 1/ω²) p̈, limited to the largest p where attachment
+    modes ring at their own ω, as after a jump of the acceleration. The estimate is the largest √(δpᵀ K δp) of a link
+    against the largest √(pᵀ K p). Phase errors of vibrations from the start on are in `start_errors`. Both together are
+    0.2 to 5 times the error of the worst torque of arms with two or more modes, up to 10 times it with one
+    (tests/mbs/test_mode_error.py). Bending across the axes of all motors counts, too, as reactions contain it.
     """
     ratios = []
     for node in run.model.tree.nodes:
@@ -76,15 +71,15 @@ def _late(body: Body) -> Array:
 
 
 def start_errors(start: Start) -> tuple[float, float]:
-    """Return the shares of a motion's largest deformation that vibrate from its start on, and are out of phase then.
+    """Return the share of the largest √(Σ pᵀ K p) of all links that vibrates from the start on, and its phase error.
 
-    The latter for too few modes; both of the largest √(Σ pᵀ K p) of all links. The former is 0 on smooth paths from
-    equilibrium, 0.1 to 1 where links start undeformed under gravity, or a path with a jump of its acceleration.
+    The phase error, a share of the same, is that of too few modes. Vibrations are 0 on smooth paths from equilibrium,
+    0.1 to 1 where links start undeformed under gravity, or a path with a jump of its acceleration.
 
     Vibration i of shape φ_i and frequency ω_i has the share z̈_i = φ_iᵀ K q̈/ω_i² of the first accelerations q̈. It begins
-    z̈_i/ω_i² away from its center; its amplitude is z̈_i/ω_i in √(2 J). With the attachment modes as late as `mode_error`
-    has them, Rayleigh's quotient lowers ω_i by δω_i/ω_i = ½ Σ_a K_a φ_ia² (1/ω_m² − 1/ω_a²). Its phase is off by δω_i T
-    at the end of the run, and matters most when damping δ_i has left 1/e of it: by δω_i/(e δ_i) at most.
+    z̈_i/ω_i² away from its center; its amplitude is z̈_i/ω_i in √(2 J). With ω_m of attachment modes (`mode_error`),
+    Rayleigh's quotient lowers ω_i by δω_i/ω_i = ½ Σ_a K_a φ_ia² (1/ω_m² − 1/ω_a²). The phase is off by δω_i T at the
+    end of the run, and matters most when damping δ_i has left 1/e of it: by δω_i/(e δ_i) at most.
     """
     if not start.largest:
         return 0.0, 0.0
@@ -127,7 +122,7 @@ X = np.array([1.0, 0.0, 0.0])
 
 
 def missed_by_pieces(run: Run, pieces: Mapping[str, ModalBody]) -> Array:
-    """Return the position error (T, 3), m, global axes, of the tip of the last of `pieces`, from the root on."""
+    """Return the position error (T, 3), m, global axes, at the tip of a link in `pieces`, named from the root on."""
     ends = {piece: [section_motion(run, f"{piece}.{end}") for end in ("root", "tip")] for piece in pieces}
     end = [*ends.values()][-1][1].r
     missed = np.zeros_like(end)
@@ -143,7 +138,10 @@ def missed_by_pieces(run: Run, pieces: Mapping[str, ModalBody]) -> Array:
 
 
 def ends_in_equations(body: Body, p: Array) -> tuple[Array, Array]:
-    """Return `rod_ends` of a piece as its equations contain them, at p (T, n), √kg·m."""
+    """Return axes (T, 3, 3) and place (T, 3), m, of a piece's tip, seen from its root, by its equations.
+
+    At p (T, n), √kg·m.
+    """
     root, tip = (bent_section(body, end, p) for end in ("root", "tip"))
     back = np.swapaxes(exponential(root.phi), -1, -2)
     return back @ exponential(tip.phi), np.einsum("tij,tj->ti", back, tip.u - root.u)
@@ -152,7 +150,7 @@ def ends_in_equations(body: Body, p: Array) -> tuple[Array, Array]:
 def rod_ends(modal: ModalBody, p: Array) -> tuple[Array, Array]:
     """Return axes (T, 3, 3) and place (T, 3), m, of the tip, seen from the root, of a rod with the strains of p (T, n).
 
-    p: √kg·m, of the file.
+    p, √kg·m, are coordinates of the modes of the modal body file.
     """
     x = np.linspace(0.0, modal.length, 2 * INTERVALS + 1)  # with the middles of intervals
     places, h = [modal.interpolate(at) for at in x], x[2]

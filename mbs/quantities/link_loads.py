@@ -1,8 +1,7 @@
 """All loads on a link over a motion as multiples of unit loads: forces at interfaces, and of its inertia. SI units.
 
-What a joint hands to the body that it carries is what that body and its outboard subtree need for their motion, less
-what else acts there (Newton and Euler, in the core). Where motors carry the motion they do so in place of the forces
-along its trajectories: loops then transmit their share of M v̇ − Q (`split_forces`).
+Forces in joints are by Newton and Euler, in the core (docs/theory.md, Stresses). Where motors carry the motion they do
+so in place of the forces along its trajectories: loops then transmit their share of M v̇ − Q (`split_forces`).
 """
 
 from collections.abc import Iterable, Mapping
@@ -26,12 +25,12 @@ from .supply import behind_gears
 class LinkLoads(NamedTuple):
     """Loads on a link during a motion."""
 
-    sizes: Mapping[str, Array]  # (T,) of unit loads by their names (`fe_models.modal_body.unit_loads`)
-    modal_force: Array  # (T, n) N/√kg, what else acts on its modes, in the coordinates of the equations: patches
+    sizes: Mapping[str, Array]  # (T,) SI, of unit loads by their names (`fe_models.modal_body.unit_loads`)
+    modal_force: Array  # (T, n) N/√kg, of patches on modes of the equations
 
 
 def loads_on_links(run: Run, bodies: Iterable[str]) -> dict[str, LinkLoads]:
-    """Return the loads on `bodies`; empty if motors turn frames, as these act at no interface."""
+    """Return the loads on `bodies`, with motors in place of path forces; {} if motors turn frames, not interfaces."""
     if run.model.scene.motors == "frame":
         return {}
     model, behind = run.model, behind_gears(run)

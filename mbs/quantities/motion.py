@@ -2,10 +2,7 @@
 
 All arrays are over the output times (T, …), global axes unless a name says otherwise.
 
-Links in pieces move as the one link. Its frame is where the link's reference condition has it: at its root, as the
-section there (cantilever), or along the chord to its tip, turned from the section at the root by no more than that
-takes (simply supported: no twist there). The modal coordinates are those whose shape is nearest to the link's; its
-points are where the pieces have them.
+Links in pieces move as the whole link: docs/theory.md, Subdivided links.
 """
 
 from dataclasses import replace
@@ -38,8 +35,8 @@ class BodyMotion:
     """Motion of a body's frame and modes, one row per output, in global axes.
 
     Attributes:
-        position: (T, 3) R, m.
-        orientation: (T, 4) quaternions of continuous sign.
+        position: (T, 3) R of the frame's origin, m.
+        orientation: (T, 4) quaternions, the scalar first, of continuous sign.
         velocity: (T, 3) m/s.
         angular_velocity: (T, 3) rad/s.
         modal, modal_velocity: (T, n), √kg·m and √kg·m/s, in the modes of the modal body file.
@@ -129,13 +126,13 @@ def _nearest_shape(modal: ModalBody, u: Array) -> Array:
 
 @kept
 def places(run: Run) -> Places:
-    """Places of frames and sections, and their velocities."""
+    """Positions, orientations and velocities of frames and sections over a run."""
     return run.model.tree.places(run.q, run.v)
 
 
 @kept
 def system_of(run: Run) -> MultibodySystem:
-    """The equations of motion, with drives on all points where payloads sit."""
+    """The equations of motion of a run, with drives without force on payloads' points, whose motion is then known."""
     scene = run.model.scene
     payloads = (PointDrive(load.point, {}) for load in scene.payload if not turns_as_a_body(scene, load))
     return MultibodySystem(run.model, Drives(at_points=(*run.applied, *payloads)))
@@ -149,19 +146,19 @@ def acting_forces(run: Run) -> MotionForces:
 
 @kept
 def constraint_rows(run: Run) -> tuple[Array, Array]:
-    """Return C (T, rows), m or rad, and C_v (T, rows, n_v)."""
+    """Return C (T, m), m or rad, of m constraint equations, and C_v (T, m, n_v)."""
     return run.model.constraints.values(run.q, run.time)
 
 
 @kept
 def cut_motions(run: Run) -> list[tuple[CutCoordinate, CutMotion]]:
-    """Coordinates of joints at which loops are cut."""
+    """Coordinates of joints at which loops are cut, each with its motion."""
     motions = run.model.along_cut.motions(run.q, run.v, run.time)
     return list(zip(run.model.cut, motions, strict=True))
 
 
 def constraint_violation(run: Run) -> Array:
-    """Return ratios (T, 3) of C, Ċ, C̈: largest row over 1 + that of q, v, a; of an equilibrium, C alone."""
+    """Return ratios (T, 3) max|C|/(1 + max|q|), max|Ċ|/(1 + max|v|), max|C̈|/(1 + max|a|); at rest, of C alone."""
     levels = [(constraint_rows(run)[0], run.q)]
     if not run.is_at_rest:
         C_dot = run.model.constraints.rates(run.q, run.v, run.time)
@@ -173,7 +170,7 @@ def constraint_violation(run: Run) -> Array:
 
 
 def reported_points(run: Run) -> dict[str, tuple[str, ...]]:
-    """Names of the reported sections of each body, in the scene's order; divided links at their first piece."""
+    """Names of the points of each body whose motion results contain, in the scene's order, by body or whole link."""
     first = {link.names[0]: name for name, link in run.links.items()}
     others = {name for link in run.links.values() for name in link.names[1:]}
     points = {}
@@ -186,12 +183,12 @@ def reported_points(run: Run) -> dict[str, tuple[str, ...]]:
 
 
 def point_names(run: Run) -> list[str]:
-    """The reported sections, as "BODY.POINT"."""
+    """Names "BODY.POINT" of the points whose motion results contain."""
     return [f"{body}.{label}" for body, labels in reported_points(run).items() for label in labels]
 
 
 def node_of(run: Run, body: str) -> Node:
-    """The node of a body."""
+    """The node of the tree with a body."""
     return run.model.tree.nodes[run.model.tree.index[body]]
 
 
@@ -201,7 +198,7 @@ def _links(run: Run) -> dict[str, BodyMotion]:
 
 
 def body_motion(run: Run, name: str) -> BodyMotion:
-    """Motion of a body's frame and modes, or of a link's."""
+    """Motion of the frame and modes of a body, or of a link in pieces as a whole."""
     if name in run.links:
         return _links(run)[name]
     node, frame = node_of(run, name), places(run).frame(run.model.tree.index[name])
@@ -263,14 +260,14 @@ def _bent(run: Run, section: Section) -> Array | float:
 
 
 def section_motion(run: Run, point: str) -> Motion:
-    """Return the motion of the section "BODY.POINT", of a point of a link where the piece has it."""
+    """Return the motion of the section "BODY.POINT"; of a link in pieces, that of the piece with this point."""
     name, _, label = point.partition(".")
     place = run.links[name].places[label] if name in run.links else point
     return places(run).at(run.model.tree.section(place))
 
 
 def deflection(run: Run, point: str) -> Array:
-    """Φ p (T, 3), m, of the section "BODY.POINT" from its place in its body or link, in the axes of that."""
+    """Displacement (T, 3), m, of the section "BODY.POINT" by deformation, in the axes of its body or whole link."""
     name, _, label = point.partition(".")
     if name in run.links:
         frame, r = _links(run)[name], section_motion(run, point).r
@@ -281,7 +278,7 @@ def deflection(run: Run, point: str) -> Array:
 
 
 def joint_motion(run: Run, name: str) -> tuple[Array, Array] | None:
-    """Return coordinates, unwrapped, rad or m, and rates per s (T, k) of a joint; None where it has none."""
+    """Return coordinates (T, k), rad or m, without jumps, of a joint, and their rates, 1/s; None where it has none."""
     if of_cut := [motion for one, motion in cut_motions(run) if one.joint.name == name]:
         return np.array([one.coordinate for one in of_cut]).T, np.array([one.rate for one in of_cut]).T
     number = run.model.tree.carried.get(name)

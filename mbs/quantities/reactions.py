@@ -22,10 +22,10 @@ from .supply import behind_gears
 
 
 def reactions(run: Run) -> Mapping[str, Wrench]:
-    """Return reactions by joint: force on its second side, N, and moment about that side, N·m.
+    """Return reactions (T, 3) by joint: force on its second side, N, and moment about that side, N·m, global axes.
 
-    A joint of the tree carries what its body and its outboard subtree need, less what else acts there and what acts
-    along its coordinates: motors, friction, loads, rotors. One that closes a loop has its multipliers.
+    A joint of the tree carries the inertia of its outboard subtree less other forces there, and less those along its
+    coordinates (motors, friction, loads, rotors). For a joint that closes a loop they follow from its multipliers.
     """
     behind = behind_gears(run)
     return _carried(run, acting_forces(behind), behind.q)
@@ -57,13 +57,13 @@ SAMPLES = 5  # outputs that are looked at: constraints that depend on each other
 class Sharing:
     """Reactions that redundant loop constraints leave undetermined."""
 
-    redundant: int  # how many constraints depend on others
-    # by joint those of its reaction that nothing determines: x, y, z, mx, my, mz, global axes
+    redundant: int  # number of constraint equations that depend on others
+    # by joint the undetermined components x, y, z, mx, my, mz of its reaction, global axes
     components: Mapping[str, tuple[str, ...]]
 
     @property
     def in_words(self) -> str:
-        """Statement in one sentence."""
+        """A warning that names the joints and components."""
         of_joints = "; ".join(f'"{joint}" ({", ".join(of)})' for joint, of in self.components.items())
         return (
             f"{self.redundant} constraints of kinematic loops are redundant: nothing determines how these reactions"
@@ -75,7 +75,7 @@ class Sharing:
 def shared_evenly(run: Run) -> tuple[Run, Sharing | None]:
     """Make redundant loop reactions unique by their least sum of squares; moments are divided by the robot's size.
 
-    None where nothing is: then the motion is as it was.
+    Return the run with these multipliers, and the reactions that stay undetermined; None where there are none.
     """
     is_loop = run.model.loop_rows
     if not is_loop.any() or not len(run.time):

@@ -36,11 +36,11 @@ PARTS = 4  # of an interval between samples
 
 @struct
 class Settling:
-    """Residual vibration of a point about its final position; see the module."""
+    """Residual vibration of a point about its final position, that of the commanded robot at rest."""
 
     residual: float  # m, peak to peak: the largest distance of two places in the last period of `frequency`
-    at_path_end: float  # m
-    at_end: float  # m, at the end of the run
+    at_path_end: float  # m, distance from the final position then
+    at_end: float  # m, the same at the end of the run
     frequency: float  # Hz, the lowest of the commanded robot at rest, or of the loop; NaN where nothing vibrates
     # s, after the path's end, until the distance stays below `tolerance`, for a period at least; NaN where it does not
     time_to: float
@@ -51,16 +51,17 @@ class Settling:
 class Rest(NamedTuple):
     """Final commanded posture of a run, rad and m."""
 
-    model: Model  # the robot that they hold
+    model: Model  # the robot under its paths
     q: Array  # (n_q,)
-    since: float  # s, when the last of them is over
+    since: float  # s, when the last path is over
     frequency: float  # Hz, the lowest of that robot there; NaN where nothing vibrates
 
 
 def commanded_rest(commanding: Run) -> Rest | None:
-    """Return the final posture of a run on paths; None if paths last to its end, or the robot can move freely.
+    """Return the final posture of a run on paths.
 
-    And where the run did not complete, or no equilibrium is near its last posture.
+    None if paths last to its end, the robot can move freely, the run did not complete, or no equilibrium is near its
+    last posture.
     """
     analysis, model = commanding.analysis, commanding.details.held or commanding.model
     if not isinstance(analysis, TimedAnalysis) or commanding.status != "completed":
@@ -125,9 +126,9 @@ def _end(target: TimeFunction, end: float, breaks: Sequence[float]) -> float:
 
 
 def end_points(scene: MechanismScene, points: Mapping[str, Sequence[str]]) -> Iterator[str]:
-    """Yield tools, points on paths, free tips and payloads' points; if there are none, the last point.
+    """Yield "BODY.POINT" of tools, points on paths, free tips and payloads; if there are none, the last point.
 
-    `points`: labels by body.
+    `points`: known labels by body.
     """
     joined = {side for joint in scene.joint for side in joint.between}
     tips = (f"{body}.tip" for body, labels in points.items() if "tip" in labels)
@@ -140,7 +141,10 @@ def end_points(scene: MechanismScene, points: Mapping[str, Sequence[str]]) -> It
 
 
 def settling(run: Run, rest: Rest, points: Sequence[str], tolerance: float, lowest: float) -> dict[str, Settling]:
-    """Return the residual vibration of `points` in a run that ends at rest; `lowest` is its frequency, Hz, or NaN."""
+    """Return the residual vibration of `points`, "BODY.POINT", in a run that should end at `rest`.
+
+    `tolerance`, m, is for settling times; `lowest`, Hz, the lowest frequency of the robot or loop, or NaN.
+    """
     first = max(int(np.searchsorted(run.time, rest.since, side="right")) - 1, 0)
     after = replace(run, time=run.time[first:], q=run.q[first:], v=run.v[first:])
     still = np.zeros((1, rest.model.tree.n_v))

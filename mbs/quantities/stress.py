@@ -2,10 +2,8 @@
 
     σ(t) = Σ_j s_j f_j(t) + Σ_k σ_k (p_k − p_s,k),    p_s = K⁻¹ Φᵀ Σ_j b_j f_j
 
-with the static stress s_j of each unit load b_j, of the whole finite element model, its size f_j, and what statics
-alone make of the modal coordinates. The modes, however few, have only inertia and damping to add (D. Williams, R.A.E.
-Report SME 3309, 1945; Craig, Structural Dynamics, 1981, ch. 15). Where static stresses or loads are not known p_s = 0:
-the mode displacement method.
+with the static stress s_j of each unit load b_j and its size f_j: docs/theory.md, Stresses. Where static stresses or
+loads are not known p_s = 0: the mode displacement method.
 """
 
 from collections.abc import Mapping
@@ -59,17 +57,17 @@ class BodyStress:
 
 @struct
 class SectionLoads:
-    """Moments and forces that layers on a link put on its sections, and on no others, as patches that stiffen it."""
+    """Moments and forces on the sections of a link under k patches, by layers such as patches that stiffen it."""
 
     edges: Array  # (k, 2) where each patch begins and ends, m from the root
     patch: Integers  # (g,) number of the patch of each place, from 0
     x: Array  # (g,) the places, ascending within a patch, m
     moment: Array  # (T, g) of the section at each place, N·m, positive with φ'
     force: Array  # (T, g) along the link, N, positive in tension
-    modal_force: Array  # (T, n) what they do to the modes of the modal body file, N/√kg
+    modal_force: Array  # (T, n) of both on the modes of the modal body file, N/√kg
 
     def shares(self, x: Array) -> Array:
-        """Return weights (m, g), without unit, of places for sections at x (m,), m: linear below one patch."""
+        """Return weights (k, g), without unit, of places for sections at x (k,), m: linear below one patch, else 0."""
         shares = np.zeros((len(x), len(self.x)))
         for k, (start, end) in enumerate(self.edges):
             own, under = np.flatnonzero(self.patch == k), np.flatnonzero((x >= start) & (x <= end))
@@ -83,10 +81,10 @@ class Recovery:
     """Data for the stresses of a body, one row per output."""
 
     method: str  # one of `METHODS`
-    modal: Array  # (T, n) p − p_s, in the modes of the modal body file
-    loads: tuple[str, ...]  # names of the unit loads beside it that are not zero; none in the mode displacement method
-    sizes: Array  # (T, l) of these
-    sections: SectionLoads | None = None  # what layers on the link do to its sections; None where there are none
+    modal: Array  # (T, n) √kg·m, p less its static part p_s, in the modes of the modal body file
+    loads: tuple[str, ...]  # names of l unit loads that are not zero; none in the mode displacement method
+    sizes: Array  # (T, l) SI, of these
+    sections: SectionLoads | None = None  # of layers on the link; None where there are none
 
     @property
     def cases(self) -> Array:
@@ -95,7 +93,7 @@ class Recovery:
         return np.concatenate([self.modal, self.sizes, *sections], axis=1)
 
     def at(self, rows: Indices) -> "Recovery":
-        """Return these outputs alone."""
+        """Return the recovery of the outputs with numbers `rows`."""
         of = self.sections
         if of is not None:
             of = replace(of, moment=of.moment[rows], force=of.force[rows], modal_force=of.modal_force[rows])
@@ -110,10 +108,10 @@ def mode_displacement(p: Array) -> Recovery:
 def mode_acceleration(
     body: ModalBody, T: Array, p: Array, loads: Mapping[str, Array], sections: SectionLoads | None = None
 ) -> Recovery:
-    """Return what stresses are made of: modes without their static share, and sizes of loads with static stresses.
+    """Return the recovery by mode acceleration: modes without their static part, and loads with static stresses.
 
-    `body` is as its file has it, p (outputs, n), √kg·m, in its modal coordinates, which are T (n, m) times those in
-    the equations; `loads` are sizes (outputs,) of unit loads by name, and `sections` what layers add.
+    p (outputs, n), √kg·m, are coordinates of the modes of `body`, its modal body file: T (n, m) times those of the
+    equations. `loads`: sizes (outputs,) of unit loads by name, SI. `sections`: loads of layers.
     """
     known = [name for name in body.stress_loads if name in loads]
     if not known:
@@ -133,7 +131,7 @@ def mode_acceleration(
 
 
 def body_stress(body: ModalBody, recovery: Recovery) -> BodyStress:
-    """Return stresses over a motion wherever the file of `body` has those of modes."""
+    """Return stresses over a motion at the points, and on the surface, for which `body` has modal stresses."""
     points = {}
     for name, point in body.stress.items():
         stress = recovery.cases @ _cases(body, recovery, point.position[:1], point.stress[None], point.static)[0].T

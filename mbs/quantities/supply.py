@@ -21,20 +21,20 @@ from .motion import system_of
 
 
 def path_force(run: Run, trajectory: str) -> Array:
-    """Return −λ (T, m) of a path: forces (N) on the point, then moments (N·m) about global axes."""
+    """Return −λ (T, m) of the m constraint equations of a path: forces (N), then moments (N·m), about global axes."""
     chosen = [k for k, row in enumerate(run.model.rows) if row.is_trajectory and row.owner == trajectory]
     return -run.multipliers[:, chosen]
 
 
 def followed_trajectories(run: Run) -> list[Trajectory]:
-    """The trajectories that hold in it: all, or none."""
+    """The trajectories that the run follows: all of the scene, or none."""
     holding = {row.owner for row in run.model.rows if row.is_trajectory}
     return [trajectory for trajectory in run.model.scene.trajectory if trajectory.name in holding]
 
 
 @kept
 def actuator_forces(run: Run) -> MotorForces | None:
-    """Return forces of motors and modes, behind compliant gears those required there; None if nothing is prescribed.
+    """Return required forces of motors, through compliant gears, and on modes; None if nothing is prescribed.
 
     Modal forces of links in pieces follow by virtual work from those on their pieces.
     """
@@ -63,7 +63,7 @@ def _supplied(run: Run) -> Supplied | None:
 
 @kept
 def motors_fit(run: Run) -> bool:
-    """Whether there are as many as the mechanism has degrees of freedom with rigid links."""
+    """Whether there are as many motors as the mechanism has degrees of freedom with rigid links."""
     return len(run.time) > 0 and len(run.model.motor_columns) == mobility(run.model, run.q[0]).freedom
 
 
@@ -76,7 +76,7 @@ def gear_motions(run: Run) -> Mapping[str, GearMotion]:
 
 @kept
 def behind_gears(run: Run) -> Run:
-    """Return the run with motors ahead of compliant gears by the required twist; unchanged if it has this twist."""
+    """Return the run with compliant gears in its tree, motors turned by their twists; itself if it has them."""
     gears = gear_motions(run)
     if not gears:
         return run
@@ -86,9 +86,9 @@ def behind_gears(run: Run) -> Run:
 
 
 def motor_motion(run: Run, joint: str) -> tuple[Array, Array, Array] | None:
-    """Return angle and rate (T,), rad, rad/s, of the motor behind a compliant gear at its joint; None without one.
+    """Return angle (T,), rad, and rate (T,), rad/s, of the motor at a compliant gear's output, and the gear's torque.
 
-    And the torque (T,), N·m, of the gear on the second side of the joint.
+    The torque (T,), N·m, acts on the second side of the joint. None for joints without such a gear.
     """
     if (known := gear_motions(run).get(joint)) is not None:
         return known.angle, known.rate, known.gear_moment
@@ -104,7 +104,7 @@ def motor_motion(run: Run, joint: str) -> tuple[Array, Array, Array] | None:
 class Energies:
     """Kinetic, strain and gravitational energy (T,) J, and the power (T,) W that modes, gears, friction dissipate.
 
-    Compliant gears store energy, too, and their motors turn as they have to.
+    Strain energy is that of links and compliant gears.
     """
 
     kinetic: Array

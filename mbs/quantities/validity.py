@@ -1,21 +1,12 @@
 """How far a run leaves the small deformations that modes describe, and how wrong its results may be for that. SI units.
 
-Deflection and section rotation are measured from the chord, the straight line between the ends of a link's axis: a
-rigid rotation of the frame counts for nothing, so that they are the same under every reference condition. The
-foreshortening ½ pᵀG p = ½∫w'² dx is that in the link's own frame, for just that is what the equations leave out, or
-know to second order where geometric stiffening is on; a cantilever, whose frame turns away from its chord, loses more
-than a link on simple supports.
+Deflection and section rotation are measured from the chord, the straight line between the ends of a link's axis, so
+that they are the same under every reference condition. The foreshortening ½ pᵀG p = ½∫w'² dx is that in the link's own
+frame, for just that is what the equations leave out, or know to second order where geometric stiffening is on.
 
-What the equations of one link miss of bending and twist is estimated from its modal coordinates and its loads.
-Loads of sizes f_j with geometric stiffness K_j change the stiffness of the modes by S = Σ f_j K_j, and move the points
-of the link by −½ pᵀK p besides Φp. Without geometric stiffening both are missing: p is off by
-Δp = −(K_ff + S)⁻¹ S p, a point by |ΦΔp − ½ pᵀK p|, as seen from the section that the inner joint carries.
-With it, what is missing is of third order in the rotations θ of sections, θ²/3, and grows near buckling as 1/(1 − μ)²,
-μ the largest relative change of stiffness. Measured against exact rods: docs/theory.md, Limits.
-
-Loads couple modes, bending with twist most of all, so that the change of each mode alone says nothing of buckling. The
-eigenvalues μ of K_ff^-½ S K_ff^-½ are the extreme relative changes of the stiffness of any shape; at −1 a shape has
-none left (Bathe, Finite Element Procedures, §6.8.2, linearized buckling).
+Estimates of errors, by the change S = Σ f_j K_j of the modes' stiffness under loads of sizes f_j, are those of
+docs/theory.md, Limits. Eigenvalues μ of K_ff^-½ S K_ff^-½ are the extreme relative changes of the stiffness of any
+shape; at −1 a shape has none left (Bathe, Finite Element Procedures, §6.8.2, linearized buckling).
 """
 
 from collections.abc import Iterator, Mapping
@@ -39,7 +30,7 @@ AT_ONCE = 64  # outputs whose eigenvalues are found together
 
 
 class LoadedPoint(NamedTuple):
-    """Interface at `position` (3,), m, with mode shapes (6, n) and stiffness K (6, n, n) by unit load there."""
+    """Interface at `position` (3,), m, with mode shapes (6, n) and geometric stiffness K (6, n, n) per unit load."""
 
     position: Array
     by_modes: Array
@@ -48,7 +39,7 @@ class LoadedPoint(NamedTuple):
 
 @struct
 class ModalLoads:
-    """Loads of sizes f (T, J) with geometric stiffness K (J, n, n), on modes of stiffness K_ff (n,), rad²/s².
+    """Loads of sizes f (T, J), SI, with geometric stiffness K (J, n, n), on modes of stiffness K_ff (n,), rad²/s².
 
     `support`: where the inner joint carries the link; rotations that the joint leaves free are 0 there.
     """
@@ -67,15 +58,15 @@ class ModalLoads:
 
     @cached_property
     def squares(self) -> Array:
-        """Squared Frobenius norms (T,) of K_ff^-½ S K_ff^-½."""
+        """Squared Frobenius norms (T,) of K_ff^-½ S K_ff^-½, S = Σ f_j K_j."""
         flat = self.relative.reshape(len(self.K), -1)
         return np.maximum(((self.f @ (flat @ flat.T)) * self.f).sum(axis=1), 0.0)
 
 
 def lasting(loads: ModalLoads, time: Array) -> ModalLoads:
-    """Return means of the loads at `time` (T,), s, over the link's lowest period: it cannot follow shorter ones.
+    """Return means of the loads at `time` (T,), s, over the link's lowest period: it cannot follow shorter loads.
 
-    The loads themselves if they stay below those that buckle the link.
+    Loads below those that buckle the link are returned as they are.
     """
     if len(time) < 2 or not len(loads.stiffness) or stiffness_change(loads)[0] < 1.0:
         return loads
@@ -90,9 +81,9 @@ def lasting(loads: ModalLoads, time: Array) -> ModalLoads:
 
 
 def stiffness_change(loads: ModalLoads) -> tuple[float, float]:
-    """Return the largest |μ| by the loads of a run, and −μ of the lowest, exact from 1 on: loads over buckling loads.
+    """Return the largest relative change |μ| of stiffness by the loads of a run, and −μ of the lowest μ.
 
-    The latter is 0 where no loads soften the link.
+    The latter is the ratio of loads to buckling loads, exact from 1 on; 0 where no loads soften the link.
     """
     largest, lowest = 0.0, 0.0
     for bound, mu in _eigenvalues(loads):
@@ -121,13 +112,13 @@ IN_MOTION = 2.0  # times what is missed at rest: loads that come at once
 
 
 class Missing(NamedTuple):
-    """Estimated errors of one link: of points, of its length; of deflections and forces, of their peaks."""
+    """Estimated errors of one link: of points by its length, and of deflections and forces by their peaks."""
 
     of_length: float
     of_deflections: float
 
     def grown_to(self, worst: "Missing") -> "Missing":
-        """Scale to the `worst` link's error of deflections; that of points in proportion, but no more than its own."""
+        """Return errors scaled to the `worst` link's error of deflections, that of points up to the worst one's."""
         if not 0.0 < self.of_deflections < worst.of_deflections:
             return self
         in_proportion = self.of_length / self.of_deflections * worst.of_deflections
@@ -137,7 +128,7 @@ class Missing(NamedTuple):
 def missing_to_first_order(link: ModalBody, T: Array, p: Array, loads: ModalLoads, *, is_at_rest: bool) -> Missing:
     """Return the errors of a link without geometric stiffening; infinite if loads at rest buckle it.
 
-    At p (T, n), √kg·m, of the equations; T times these are those of the file.
+    p (T, n), √kg·m, are modal coordinates of the equations; the matrix T turns them into those of the file.
     """
     if not len(p) or not loads.f.size:
         return Missing(0.0, 0.0)
@@ -179,8 +170,8 @@ def _carried(support: LoadedPoint, moved: Array, places: Array) -> Array:
 def missing_to_second_order(link: ModalBody, p: Array, shortening: float, stiffness_change: float) -> Missing:
     """Return the errors of a link with geometric stiffening at p (T, n), √kg·m, of the file.
 
-    From its displacement and `shortening` (of its length), its rotations (twist from the root on, bending from the
-    chord) and μ.
+    By its displacement, `shortening` (by its length), rotations (twist from the root on, bending from the chord), and
+    the relative `stiffness_change`.
     """
     if stiffness_change >= 1.0:
         return Missing(np.inf, np.inf)
@@ -204,9 +195,9 @@ def _largest(p: Array, shapes: Array) -> float:
 
 
 def largest_lengths(p: Array, shapes: Array) -> Array:
-    """Return the largest length (T,), m or rad, at p (T, n), √kg·m, of what moves by `shapes` (k, axes, n).
+    """Return the largest |shape · p| (T,), m or rad, of k `shapes` (k, axes, n) at p (T, n), √kg·m.
 
-    One k after the other: all of them at once do not fit into memory in long runs.
+    One shape after the other: all at once do not fit into memory in long runs.
     """
     squares = np.zeros(len(p))
     for shape in shapes:
@@ -225,28 +216,28 @@ ENOUGH = 1e-3  # shortening of a piece by bending: tips are then right to some 1
 class Bending:
     """Largest values of one flexible link over a run."""
 
-    deflection: float  # distance of its axis from its chord, of its length
+    deflection: float  # distance of its axis from its chord, by its length
     rotation: float  # angle between a section's normal and the chord, rad
     foreshortening: float  # ½∫w'² dx over its length, in its own frame, m
-    # N·m, that times the largest force at an interface at the same time: what moments miss
+    # N·m, foreshortening times the largest force at an interface at the same time: the error of moments
     foreshortening_moment: float
-    # by the loads of the run, relative, of the shape where it is largest; 0 where the modal body file does not tell
+    # by the loads of the run, relative, of the shape where it is largest; 0 without data in the modal body file
     stiffness_change: float
     length: float  # m, of the link
     is_stiffened: bool  # whether geometric stiffening is in the equations
-    missing: Missing  # errors as `second_order` estimates them
-    pieces: int = 1  # into how many it is divided; the values are then those of its worst piece
+    missing: Missing  # estimated errors
+    pieces: int = 1  # number of pieces of the link; the values are then those of its worst piece
     is_divisible: bool = False  # whether the scene lets it be divided
-    buckling: float = 0.0  # how many times the loads under which the link buckles are reached, from 1 on
+    buckling: float = 0.0  # ratio of loads to those under which the link buckles, exact from 1 on
 
     @property
     def shortening(self) -> float:
-        """The foreshortening, of the length."""
+        """The foreshortening by the length."""
         return self.foreshortening / self.length
 
     @property
     def is_beyond(self) -> bool:
-        """Whether small deformations end before."""
+        """Whether the link exceeds a limit of small deformations."""
         return (
             self.deflection > DEFLECTION_LIMIT[self.is_stiffened]
             or self.shortening > SHORTENING_LIMIT[self.is_stiffened]
@@ -256,7 +247,7 @@ class Bending:
 
     @property
     def in_words(self) -> str:
-        """Deflection, rotation and change of stiffness as text."""
+        """Text on deflection, change of stiffness and buckling."""
         stiffening = "with geometric stiffening" if self.is_stiffened else "geometric stiffening is off"
         times = f" and are {self.buckling:.3g} times those under which it buckles" if self.buckling >= 1.0 else ""
         return (
@@ -276,7 +267,7 @@ class Bending:
 
     @property
     def advice(self) -> str:
-        """Remedy as text."""
+        """Text with a remedy: geometric stiffening, or division of the link."""
         if not self.is_stiffened and self.shortening <= SHORTENING_LIMIT[True]:
             return "consider geometric_stiffening = true"
         if not self.is_divisible:
@@ -287,15 +278,15 @@ class Bending:
 
 
 def enough_pieces(shortening: float, count: int) -> int:
-    """Return how many pieces, 2 or more, bend so little that each shortens by `ENOUGH` of its length.
+    """Return the number of pieces, 2 or more, with which each shortens by at most `ENOUGH` of its length.
 
-    The `shortening` of a link in `count` pieces is relative to its length, and falls with the square of their number.
+    The relative `shortening` of a link in `count` pieces falls with the square of their number.
     """
     return max(2, ceil(count * sqrt(shortening / ENOUGH)))
 
 
 def link_bending(run: Run, links: Mapping[str, ModalBody]) -> dict[str, Bending]:
-    """Return the deflection measures of flexible bodies of the equations; `links` are their modal bodies."""
+    """Return the measures of deflection of flexible bodies by name; `links` are their modal bodies."""
     loads = loads_in_equations(run, links) if len(run.time) else {}
     return {
         name: _bending_of(run, name, link, loads[name].sizes if name in loads else {}) for name, link in links.items()
@@ -365,7 +356,7 @@ def _on_modes(link: ModalBody, run: Run, node: Node, sizes: Mapping[str, Array])
 def shape_from_chord(link: ModalBody, p: Array) -> tuple[Array, Array, Array]:
     """Return largest deflection (m), section rotation (rad) from the chord, foreshortening (m), (T,), at p (T, n).
 
-    Across along y and z: v' = φ_z, w' = −φ_y.
+    p: √kg·m, of the file. Slopes along y and z: v' = φ_z, w' = −φ_y.
     """
     stations, x = link.stations, link.stations.position[:, 0]
     shares = 0.5 * (np.append(np.diff(x), 0.0) + np.append(0.0, np.diff(x)))  # of the length, by the trapezoidal rule
@@ -377,7 +368,7 @@ def shape_from_chord(link: ModalBody, p: Array) -> tuple[Array, Array, Array]:
 
 
 def largest(bodies: Mapping[str, Bending]) -> tuple[str, Bending] | None:
-    """The link whose results are worst, of those beyond small deformations where there are any; None of no links."""
+    """Name and measures of the link with the worst results, first of those beyond small deformations; None if none."""
     return max(bodies.items(), key=lambda item: (item[1].is_beyond, item[1].missing.of_length), default=None)
 
 
