@@ -47,7 +47,7 @@ def schema(kind: str) -> dict[str, Any]:
 
 
 def scene_in(space: str | None) -> dict[str, Any]:
-    """The schema of scenes of a `space`, with its definitions; None: with all keys, those of 3D as they are there."""
+    """The schema of scenes of a `space`, with its definitions; None: with all keys, as 3D scenes have them."""
     from .scene.scene import SceneKeys
 
     generator = {PLANAR: _Planar, SPATIAL: _Spatial, None: _Described}[space]

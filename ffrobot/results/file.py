@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 @struct
 class ModalFile:
-    """The modal body file that a body of the scene came from, as it was then."""
+    """The modal body file of a body of the scene, with its hashes at the time of the run."""
 
     path: Path
     sha256: str
@@ -57,7 +57,7 @@ NUMBER = re.compile(r"(\d+)")
 
 
 def dataset_and_column(name: str) -> tuple[str, int | None]:
-    """Split `name[k]` into dataset and number of its column, which is None where only the dataset is named."""
+    """Split `name[k]` into dataset and number of its column; None without a column."""
     match = re.fullmatch(r"(.*?)\[(\d+)\]", name)
     return (match[1], int(match[2])) if match else (name, None)
 
@@ -79,9 +79,9 @@ class Results:
     Raises `InputError` where `path` is no results file.
 
     Attributes:
-        path: of the file, as messages call it.
-        scene, scene_text: the scene file, as TOML has it and as text.
-        asked: names of datasets and groups in analyses that were read.
+        path: of the file, for messages.
+        scene, scene_text: the scene file, as tables and as text.
+        asked: names of datasets and groups in analyses that were read so far.
     """
 
     def __init__(self, path: PathLike[str] | str, *, image: bytes | None = None) -> None:
@@ -104,7 +104,7 @@ class Results:
 
     @classmethod
     def from_image(cls, image: bytes, path: Path) -> Results:
-        """Results whose file is in memory only; messages call them `path`."""
+        """Results from the bytes of a file that exists only in memory; messages name it `path`."""
         return cls(path, image=image)
 
     def __repr__(self) -> str:
@@ -192,7 +192,7 @@ class Results:
     def columns(self, analysis: str) -> dict[str, Array]:
         """All histories of an analysis, one (T,) array in SI units each.
 
-        Named as in the analysis, with the column where there are several: `points/link2.tip/position[0]`.
+        By name in the analysis, with the column where there are several: `points/link2.tip/position[0]`.
         """
         by_label: dict[str, Array] = {}
         for name in self.histories(analysis):
@@ -232,16 +232,16 @@ class Results:
         return read_linear(self._file, analysis)
 
     def controller(self, analysis: str) -> SampledController:
-        """Return controllers of a closed-loop run at its start, with the observer, as one linear system of samples.
+        """Return controllers and observer of a closed-loop run at its start as one linear discrete-time system.
 
         Raises `InputError` where the analysis has none: no loop, or controllers that are not linear.
         """
         return self.controllers(analysis)[0]
 
     def controllers(self, analysis: str) -> tuple[SampledController, ...]:
-        """Return controllers as `controller` does, one for each instant of a scheduled observer, with the same states.
+        """Return linear discrete-time controllers of a closed-loop run, one for each instant of a scheduled observer.
 
-        Straight lines between their matrices approximate those of the run. Raises `InputError` likewise.
+        All have the same states; interpolated matrices approximate those of the run. Raises as `controller`.
         """
         if not self.has(f"{analysis}/control/controller"):
             known = quoted(self._with("control/controller"))
@@ -284,7 +284,7 @@ class Results:
         return {name: ModalFile(Path(e["path"]), e["sha256"], e["input_hash"]) for name, e in entries}
 
     def modal_body(self, name: str) -> ModalBody:
-        """The modal body that body `name` was solved with.
+        """The modal body of body `name` in the run.
 
         Sought at its path, then in the folder of the results; its hash has to be the same.
         Raises `InputError` where `name` is no flexible body, or its file cannot be found.
@@ -311,7 +311,7 @@ class Results:
         return p @ self[place].T if self.has(place) else p
 
     def stress_recovery(self, analysis: str, body: str) -> Recovery:
-        """Data for the stresses of a flexible body, for `mbs.quantities.stress`; of old files modal coordinates."""
+        """Modal coordinates and load sizes that determine the stresses of a flexible body; see `Recovery`."""
         from ..mbs.quantities.stress import Recovery, SectionLoads, mode_displacement  # loads the core
 
         p, place = self.modal(analysis, body), f"{analysis}/stress/{body}"
@@ -379,7 +379,7 @@ class Results:
         return _Attributes(f"{self.path}: {group}", dict(self._file[group].attrs))
 
     def settling(self, point: str, option: str = "settling") -> tuple[str, Mapping[str, Any]]:
-        """First analysis with residual vibration of "BODY.POINT" (or of "ANALYSIS/BODY.POINT"), and its numbers.
+        """First analysis with residual vibration of "BODY.POINT" (or of "ANALYSIS/BODY.POINT"), and its attributes.
 
         Raises `InputError`, with the `option` that names the point, where there is none.
         """
@@ -420,7 +420,7 @@ class Results:
         return numbers(item, f"{self.path}: {dataset}")
 
     def time(self, dataset: str) -> Array:
-        """Output times (T,), in s, of the analysis that `dataset` belongs to; the analysis' own name does, too.
+        """Output times (T,), s, of the analysis of `dataset`, or of the analysis with that name.
 
         For `control/` of closed-loop runs, the times of its samples.
         """
@@ -439,9 +439,9 @@ class Results:
         return values[:, k : k + 1]
 
     def peak(self, name: str) -> tuple[float, float]:
-        """The largest size of a history, in its unit, and when it has that, s; between outputs if the file has that.
+        """The largest absolute value of a history, in its unit, and its time, s; between outputs if the file has that.
 
-        Of all columns, of one of them, `name[k]`, or of the length of a deflection or a reaction.
+        Of all columns, of one of them, `name[k]`, or of the length of a vector such as a deflection.
         """
         from .peaks import peak_of
 

@@ -18,7 +18,7 @@ class Coordinate(NamedTuple):
     """One coordinate of a joint."""
 
     joint: str
-    column: str  # which column of `coordinate`, `rate` and `moment` it is: "", or "[0]", "[1]"
+    column: str  # "" or "[0]", "[1]", … in datasets `coordinate`, `rate` and `moment`
     unit: str  # "rad" or "m"
     limits: MotorLimits  # of its motor; infinite where the scene gives none
 
@@ -33,7 +33,7 @@ class Coordinate(NamedTuple):
 
 
 def joint_type(keys: Mapping[str, Any]) -> type[JointRecord]:
-    """The record of a joint with these keys."""
+    """The class of a joint with `keys` of a scene, by its key `type`."""
     return JOINT_TYPES[str(keys["type"])]
 
 
@@ -60,7 +60,7 @@ def joint_coordinates(scene: Scene, name: str) -> tuple[Coordinate, ...]:
 
 
 def unit_of(scene: Scene, name: str) -> str:
-    """Return the unit of a dataset of an analysis, "" without one; of a joint's that of its coordinates."""
+    """Return the unit of dataset `name` of an analysis, "" if unknown; of a joint's, by the unit of its coordinates."""
     known, parts = meaning(name), name.split("/")
     units = known.unit.split(", ") if known is not None else []
     if parts[0] == "joints" and len(units) == 2:  # of angles, of displacements

@@ -49,7 +49,7 @@ def write_off_path(group: h5py.Group, solution: Solution, result: AnalysisResult
 
 
 def tool_error(group: h5py.Group, scene: Scene, *, feasible: bool | None) -> ToolError:
-    """Return the tool error of an analysis; `feasible` is that of its verdict."""
+    """Return the tool error of an analysis; `feasible`: whether motors and patches suffice, by its verdict."""
     if _is_controlled(group) and (about := own_results(group).about(group)):
         return ToolError(controlled=float(about["tip_error_max"]))
     if (replayed := max((most for _, most, _ in off_path(group, scene)), default=None)) is not None:
@@ -64,9 +64,9 @@ def tool_error(group: h5py.Group, scene: Scene, *, feasible: bool | None) -> Too
 
 
 def off_path(group: h5py.Group, scene: Scene) -> Iterator[tuple[str, float, float]]:
-    """Yield each point of a replay with its largest and RMS distance (m) from its given path, over their common time.
+    """Yield each point of a replay with its largest and RMS distance (m) from its prescribed path.
 
-    Along the axes for which the path was given; of old files at outputs that both have.
+    Over their common time and along the axes that the path prescribes; for old files at common outputs.
     """
     if "off_path" in group:
         for one in group["off_path"].values():
@@ -100,7 +100,7 @@ AT_REST = 0.3  # of the mean rate of a path: what its first and last steps have 
 
 
 def judge(file: h5py.File, analyses: Sequence[str], scene: Scene) -> Verdict:
-    """The verdict of the `analyses` of a results file of a `scene`."""
+    """The verdict on the `analyses` of a results `file` of a `scene`."""
     return Verdict(tuple(_judge(name, file[name], scene) for name in analyses))
 
 
@@ -139,7 +139,7 @@ def _judge(name: str, group: h5py.Group, scene: Scene) -> AnalysisVerdict:
 
 
 def end_of(scene: Scene, name: str) -> float:
-    """Return the end of an analysis, s, or of its actuation; 0 for one without duration."""
+    """Return the end, s, of the analysis `name`, or of its actuation; 0 for one without duration."""
     keys: Mapping[str, Any] = next((keys for keys in scene.get("analysis", []) if keys["name"] == name), {})
     return float(keys["end"]) if "end" in keys else end_of(scene, keys["actuation"]) if "actuation" in keys else 0.0
 

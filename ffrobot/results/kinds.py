@@ -39,7 +39,7 @@ LISTED = 3  # natural frequencies
 def write_linear(group: h5py.Group, run: Run, linear: LinearModels) -> None:
     """Write linear/ of an analysis, and its joint conditions.
 
-    Models (T, …), poles, frequencies, shapes of all bodies, reach; zeros (T, most, 2) are nan where there are fewer.
+    Models (T, …), poles, frequencies, shapes of all bodies, controllability; zeros (T, most, 2), 1/s, padded by nan.
     """
     n_v, models = run.model.tree.n_v, linear.models
     write_joint_conditions(group, run, linear)
@@ -152,9 +152,9 @@ def write_placement(group: h5py.Group, _: Run, placed: Placed) -> None:
 
 
 def write_tracking(group: h5py.Group, run: Run, tracked: TrackedPath) -> None:
-    """Write tracking/ of an analysis: the errors made small, and the effort for it.
+    """Write tracking/ of an analysis: errors and effort.
 
-    Work (J) and largest power (W) of motors and of patches, what each zero asks for (V), prices of limits.
+    Also work (J) and largest power (W) of motors and of patches, least voltage for each zero (V), prices of limits.
     """
     group = group.create_group("tracking")
     about = group.attrs
@@ -199,7 +199,7 @@ def read_unsupplied(group: h5py.Group) -> Unsupplied | None:
 
 
 def read_controllers(file: h5py.File, analysis: str) -> tuple[SampledController, ...]:
-    """The controllers of a loop that has linear ones, at each instant of their schedule."""
+    """The linear discrete-time controllers of a closed loop, one for each instant of their schedule."""
     from ..actuation.control.linear_model import SampledController
 
     group, time = file[f"{analysis}/control/controller"], file[f"{analysis}/control/time"]
@@ -218,7 +218,7 @@ def read_controllers(file: h5py.File, analysis: str) -> tuple[SampledController,
 
 
 def read_linear(file: h5py.File, analysis: str) -> tuple[LinearModel, ...]:
-    """The linear models of an analysis that has them."""
+    """The linear models of an analysis with linear/, one for each of its times."""
     from ..actuation.control.linear_model import LinearModel
 
     group, time = file[f"{analysis}/linear"], file[f"{analysis}/time"][()]
@@ -230,7 +230,7 @@ def read_linear(file: h5py.File, analysis: str) -> tuple[LinearModel, ...]:
 
 
 def save_models(models: Sequence[StateSpace], path: Path) -> None:
-    """Write models to .npz or .mat: one as it is, several with a first axis over their times."""
+    """Write models to a file .npz or .mat; arrays of several have a first axis over their times."""
     if len(models) == 1:
         models[0].save(path)
         return
@@ -295,13 +295,12 @@ def _nothing(*_: object) -> str:
 
 @struct
 class OwnResults:
-    """Results of one kind of analysis alone.
+    """How results that only one kind of analysis has are written and judged.
 
     Attributes:
-        part: name of their group in the group of the analysis; empty without one. Its attribute `advice` is what to
-            try next.
+        part: name of their group in the group of the analysis; "" without one. Its attribute `advice` names remedies.
         write: writes the details of a run to the group of its analysis.
-        answer: answer in words by the attributes of `part`, in place of whether motors and patches can do it.
+        answer: text of the verdict by the attributes of `part`, in place of whether motors and patches suffice.
     """
 
     part: str = ""
@@ -309,7 +308,7 @@ class OwnResults:
     answer: Callable[[About], str] = _nothing
 
     def about(self, group: h5py.Group) -> About:
-        """Attributes of `part` of an analysis; none where it has no such part."""
+        """Attributes of the group `part` of an analysis; {} without this group."""
         return group[self.part].attrs if self.part in group else {}
 
 
@@ -334,5 +333,5 @@ OF_KIND: Mapping[str, OwnResults] = {
 
 
 def own_results(group: h5py.Group) -> OwnResults:
-    """The results of its kind alone, of the group of an analysis."""
+    """How to write and judge results of the kind of the analysis with this group."""
     return OF_KIND.get(str(group.attrs["kind"]), OwnResults())

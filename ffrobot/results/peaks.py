@@ -29,7 +29,7 @@ MEAN_POWER, RMS_POWER = "mean_power", "rms_power"
 def peaking(result: AnalysisResult) -> Iterator[tuple[str, Array]]:
     """Name and values (T, …) of each history of an analysis that has peaks, at all times of `result.histories`.
 
-    In SI units and along the axes of the scene. Where only parts are wanted: these, and what costs no evaluation.
+    In SI units and along the axes of the scene. Where only parts are wanted: these, and some that cost nothing.
     """
     of, wants = result.histories, result.wants
     run, space = of.run, of.run.space
@@ -80,7 +80,7 @@ def _of_joint(result: AnalysisResult, joint: JointRecord, place: str) -> Iterato
 def peak_of(dataset: h5py.Dataset, time: Array, column: int | None = None) -> tuple[float, float]:
     """Return the largest absolute value of one column or of all (of vectors: length), in its unit, and its time, s.
 
-    Where the file has no such peak (a column of a vector, old files), the largest at the outputs `time` (T,), s.
+    By the peaks in the file, or without them (a column of a vector, old files) at the outputs `time` (T,), s.
     """
     peaks, times = (np.atleast_1d(dataset.attrs.get(key, ())) for key in ("peak", "peak_time"))
     if len(peaks) and (column is None or len(peaks) == np.prod(dataset.shape[1:])):
@@ -94,9 +94,9 @@ def peak_of(dataset: h5py.Dataset, time: Array, column: int | None = None) -> tu
 
 
 def write_peaks(group: h5py.Group, time: Array, histories: Mapping[str, Array], outputs: Indices) -> None:
-    """Write `histories` (T, …) at `time` (T,), s: values at outputs, and of all times the attributes of peaks.
+    """Write `histories` (T, …) at `time` (T,), s: datasets at `outputs`, with attributes by all times.
 
-    These are `peak`, `peak_time`, `rms`, `mean` of every column, of vectors of the length.
+    The attributes are `peak`, `peak_time`, `rms`, `mean` of every column, or of the length of vectors.
     """
     weights = shares(time)
     for name, values in histories.items():

@@ -39,10 +39,11 @@ COUNTS = ("steps", "rejected", "evaluations", "wall_seconds")
 def solve_and_keep(
     scene: Scene, path: Path | None, watcher: Watcher, again: str, *, resume: bool = False, wanted: Iterable[str] = ()
 ) -> Solution | None:
-    """Run the analyses of a scene, which go on from the file `path` with `resume`, and write that file where given.
+    """Run the analyses of a scene, and write the results file `path` if given, also before an error is raised.
 
-    Before an error is raised, too: all of it, or what is `wanted`. `again`: the command that resumes the run. None
-    where nothing is left to run. Raises as `solve_scene`, and `StoppedError` where a signal has cut a run short.
+    With `resume` they go on from that file; None if it is complete. `wanted`: names to which results are limited.
+    `again`: the command that resumes the run, for messages. Raises as `solve_scene`, and `StoppedError` where a signal
+    has cut a run short.
     """
     inputs = [scene.path, *named_files(tomllib.loads(scene.text), scene.path.parent)]
     kept: list[Solution] = []
@@ -73,7 +74,7 @@ def solve_and_keep(
 def check_ended(solution: Solution, watcher: Watcher, again: str, scene_file: Path) -> None:
     """Raise `SolveError` where an analysis ended early, `StoppedError` where a signal interrupted it.
 
-    `again`: the command that resumes the run; empty without a file. `scene_file`: the scene, as it was named.
+    `again`: the command that resumes the run, "" without a file; `scene_file`: for messages.
     """
     go_on = how_to_go_on(solution, again)
     try:
@@ -102,7 +103,7 @@ MAY_CHANGE = "max_steps"  # counts from where a run goes on
 
 
 def check_same_input(scene: Scene, bodies: Mapping[str, LoadedBody], file: Results) -> None:
-    """Raise `InputError` naming the first thing that is not as it was."""
+    """Raise `InputError` naming the first part of scene, bodies or input files that differs from that of `file`."""
     change = next(_changes(scene, bodies, file), None)
     if change is not None:
         raise InputError(

@@ -56,7 +56,7 @@ def voltage_cells(results: Results, analysis: str) -> Iterator[Cells]:
 
 
 def placement_cells(results: Results, analysis: str) -> Iterator[Cells]:
-    """Patches of a placement against as many spread evenly: reach of modes, deviation, or largest voltage of a path."""
+    """Yield the table row of a placement of patches: optimum and evenly spaced ones by its criterion, centers (m)."""
     if not results.has(group := f"{analysis}/placement"):
         return
     about, criterion = results.attributes(group), results.attributes(group)["criterion"]
@@ -77,7 +77,7 @@ def placement_cells(results: Results, analysis: str) -> Iterator[Cells]:
 
 
 def robustness_cells(results: Results, analysis: str) -> Iterator[Cells]:
-    """Largest distance of the tip from the computed motion by cause, lanes side by side."""
+    """Yield a table row for each cause: largest distance (mm) of the tip, by use of the computed inputs."""
     if not results.has(group := f"{analysis}/robustness"):
         return
     for k, cause in enumerate(results.attributes(group)["causes"]):
@@ -108,7 +108,7 @@ def settling_cells(results: Results, analysis: str) -> Iterator[Cells]:
 
 
 def volts(value: float) -> str:
-    """Three digits, from 1 kV on all."""
+    """Text of a voltage `value`, V, with three digits; from 1 kV on without decimals."""
     return f"{value:.0f}" if value >= 1e3 else f"{value:.3g}"
 
 

@@ -16,7 +16,7 @@ ROUND_OFF = 1e-9  # m, N·m, rad/s, W: numbers below it are round-off
 
 
 def number(value: float) -> str:
-    """Four digits; 0 of round-off."""
+    """Text of `value` with four digits; "0" for round-off."""
     return f"{value if value > ROUND_OFF else 0:.4g}"
 
 
@@ -27,13 +27,13 @@ def millimeters(value: float, digits: int = 4) -> str:
 
 @struct
 class ToolError:
-    """Largest distance (m) of a point from its path in an analysis; None where no path is given.
+    """Largest distance (m) of a point from its path in an analysis; None where there is no path.
 
     Attributes:
         controlled: with joints position-controlled on the computed angles, or in a closed loop; of analyses that
             prescribe the path and have actuators for it, the error of the computation.
-        open_loop: with the computed torques applied open loop; beside `growth` an estimate for the first vibration.
-        growth: 1/s, of the robot under these torques; 0 where it is not unstable or not known.
+        open_loop: with the computed torques open loop; where `growth` > 0 an estimate for the first vibration.
+        growth: 1/s, rate at which deviations grow under these torques; 0 where stable or not known.
     """
 
     controlled: float | None = None
@@ -49,13 +49,13 @@ STILL = 0.01  # of the tolerance within which a point has settled: a smaller res
 
 
 def vibrates(about: Mapping[str, Any]) -> bool:
-    """Whether a point with these attributes of `settling/POINT` has any residual vibration to speak of."""
+    """Whether attributes of `settling/POINT` have a settling time, or residual vibration that matters."""
     return bool(about["residual"] > STILL * about["tolerance"] or about["time_to"] != 0.0)
 
 
 @struct
 class Settled:
-    """Residual vibration of the point that vibrates most after all paths; see `mbs.quantities.settling.Settling`."""
+    """Residual vibration of the point that vibrates most after all paths are over."""
 
     point: str
     residual: float  # m, peak to peak
@@ -65,7 +65,7 @@ class Settled:
 
     @property
     def in_words(self) -> str:
-        """Peak to peak, and when it has settled."""
+        """Text with amplitude, peak to peak, and settling time."""
         at = "" if np.isnan(self.frequency) else f" (lowest frequency {self.frequency:.3g} Hz)"
         when = "at no time of the run" if np.isnan(self.time_to) else f"{self.time_to:.3g} s after the path"
         within = f"within {millimeters(self.tolerance)} of its final position {when}"
@@ -74,11 +74,11 @@ class Settled:
 
 @struct
 class PatchNeed:
-    """Required voltage of a body's patches over its limit (0: none), time (s), and sufficient limit (V)."""
+    """Voltages of a body's patches against their limits."""
 
-    factor: float
-    since: float
-    limit: float
+    factor: float  # largest ratio of required voltage to limit; 0 without limits
+    since: float  # s, when the limit is first exceeded; NaN if never
+    limit: float  # V, that would suffice
 
 
 @struct
@@ -86,10 +86,10 @@ class AnalysisVerdict:
     """Verdict of one analysis.
 
     Attributes:
-        name, kind, status: of the analysis; `cause` why it ended early.
+        name, kind, status: of the analysis; `cause` of an early end.
         reached: s, the last output, and the requested end.
         answer: in words, whether motors and patches suffice, the verdict of closed-loop control, or the distance from
-            the path under computed inputs; empty where nothing is asked.
+            the path under computed inputs; empty without requirement.
         feasible: whether motors and patches suffice; None without a requirement.
         motors: by joint, in the order of the scene: peaks, RMS and limits at the joint.
         units: of the force along each of these joints, "N·m" or "N".

@@ -69,7 +69,7 @@ def write_results(solution: Solution, path: Path) -> None:
 
 
 def results_image(solution: Solution) -> bytes:
-    """The content of the results file of a solution: all of it, or what is wanted."""
+    """The bytes of the results file of a solution; of `wanted` datasets alone where the solution has these."""
     with in_memory() as file:
         _write_head(file, solution)
         for name, result in solution.analyses.items():
@@ -370,14 +370,14 @@ def write_state(file: h5py.File, solution: Solution) -> None:
 
 
 def left_out(solution: Solution) -> list[str]:
-    """Analyses that were not begun when the run was stopped, or ended by an error."""
+    """Names of the analyses that had not begun when a signal or an exception ended the run; [] after a failed one."""
     if any(outcome.failed and outcome.status not in STOPPED for outcome in solution.outcomes.values()):
         return []
     return [one.name for one in solution.scene.analysis if one.name not in solution.outcomes]
 
 
 def stopped(solution: Solution) -> Run | None:
-    """The analysis that was stopped."""
+    """The run of the analysis that was stopped before its end; None without one."""
     return next((outcome for outcome in solution.outcomes.values() if outcome.status in STOPPED), None)
 
 

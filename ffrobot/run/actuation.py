@@ -39,9 +39,9 @@ class Actuation:
     """Requirements of an analysis on motors and patches.
 
     Attributes:
-        voltages: by layout.
-        unmet: by body with patches, (T, n) N/√kg on modes of its file, that voltages within their limits leave.
-        feasibility: whether motors and patches can do it, within their limits.
+        voltages: of patches, by layout ([[pzt]]).
+        unmet: (T, n) N/√kg, by body with patches: forces on modes of its file that no voltage within limits supplies.
+        feasibility: whether motors and patches keep their limits.
     """
 
     voltages: Mapping[str, Voltages]
@@ -49,7 +49,7 @@ class Actuation:
     feasibility: Feasibility
 
     def at(self, rows: Indices) -> Actuation:
-        """Voltages and forces at outputs `rows` (T,) alone; the feasibility stays that of all."""
+        """Voltages and forces at the outputs with numbers `rows` alone; the feasibility stays that of all outputs."""
         voltages = {name: of_layout.at(rows) for name, of_layout in self.voltages.items()}
         return replace(self, voltages=voltages, unmet={name: values[rows] for name, values in self.unmet.items()})
 
@@ -73,7 +73,7 @@ def make_patches(scene: Scene, bodies: Bodies) -> dict[str, LinkPatches]:
 
 
 def points_3d(scene: Scene, bodies: Bodies) -> dict[str, PointSet]:
-    """Actuation points by body. Raises `InputError` for those that do not fit it."""
+    """Actuation points by body. Raises `InputError` for points that do not fit their body."""
     return {
         layout.body: make_point_set(
             scene.path, layout, bodies[layout.body].modal, bodies[layout.body].spatial, SPACES[scene.space]
@@ -83,7 +83,7 @@ def points_3d(scene: Scene, bodies: Bodies) -> dict[str, PointSet]:
 
 
 def given_voltages(scene: Scene, model: Model, patches: Mapping[str, LinkPatches]) -> Iterator[Drive]:
-    """Drives by the voltages that the scene prescribes for patches, behind their hysteresis."""
+    """Yield modal forces by the voltages that the scene prescribes for patches, with their hysteresis."""
     bodies = {label: body for body, of_link in patches.items() for label in of_link.arrays}
     for number, load in enumerate(scene.load, 1):
         if load.pzt is not None:
@@ -123,9 +123,9 @@ def _straight(key: str, analyses: Sequence[Analysis], voltage: Sequence[TimeFunc
 
 
 def find_actuation(scene: Scene, run: Run, bodies: Bodies, patches: Mapping[str, LinkPatches]) -> Actuation:
-    """Find voltages (V) for the modal forces of a motion, as nearly as patches can, and judge all actuators.
+    """Find voltages (V) of patches that come nearest to the modal forces of a motion, and judge all actuators.
 
-    Links with actuation points need no patches, and none does where a later analysis has the forces on the paths.
+    Links with actuation points need no patches, and none does where a later analysis applies forces on the paths.
     """
     from ..actuation.feasibility import find_unmet, judge_actuators, links_in_motion
 

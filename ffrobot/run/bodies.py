@@ -33,11 +33,11 @@ class LoadedBody:
 
     Attributes:
         spatial: its equations in space, in which payloads with inertia on links are bodies of their own.
-        carrying: with these as well, as small rotations turn them: its modes are those of the loaded link.
-        structure: what patches that are part of it change.
+        carrying: the same with these payloads at small rotations: its modes are those of the loaded link.
+        structure: change of mass and stiffness by patches; None without any.
         modal, path: its modal body and the file of that, None where it is rigid.
-        computed, reused: whether stage 1 ran for it, and why not.
-        motions: the families of motion that the scene can ask of a link.
+        computed, reused: whether stage 1 ran for it, and if not, why.
+        motions: families of motion (bending, torsion, axial) that the scene can require of a link.
     """
 
     _: KW_ONLY
@@ -57,12 +57,12 @@ class LoadedBody:
 
     @property
     def rigid_in(self) -> tuple[Family, ...]:
-        """Motions that a link cannot follow, since its file has no modes of them; none of a rigid body."""
+        """Families of motion of which a link's file has no modes; () of a rigid body."""
         return () if self.modal is None else tuple(one for one in self.motions if one not in self.modal.family)
 
     @property
     def without_coordinate(self) -> tuple[Family, ...]:
-        """Motions of which a link's file has modes, and the equations keep none of them, nor a static shape."""
+        """Families of motion of which a link's file has modes, but the equations have neither mode nor static shape."""
         if self.modal is None or self.spatial.reduction is None:
             return ()
         moving = self.spatial.modal_transform.any(axis=1)
@@ -71,7 +71,7 @@ class LoadedBody:
 
 
 def links_of(bodies: Mapping[str, LoadedBody]) -> dict[str, ModalBody]:
-    """Modal bodies of those that are flexible, by name."""
+    """Modal bodies of flexible `bodies`, by name."""
     return {name: body.modal for name, body in bodies.items() if body.modal is not None}
 
 
@@ -97,8 +97,8 @@ def _records_on(
 def load_bodies(scene: Scene, stage: Callable[[str], None]) -> dict[str, LoadedBody]:
     """Load bodies by name in the order of the scene, with payloads and patches; runs stage 1 for outdated links.
 
-    With geometric stiffening where the scene, or their key `pieces`, may put it into the equations. Raises `InputError`
-    for files that are none, and payloads and patches that do not fit.
+    Links have data for geometric stiffening where the scene, or their key `pieces`, may require it. `stage` is called
+    with the name of each step. Raises `InputError` for wrong files, and payloads and patches that do not fit.
     """
     patches = dict(by_body(scene.pzt))
     with of_file(scene.path):

@@ -34,7 +34,10 @@ KEPT = 1.0 + 1e-9  # times a limit
 
 @dataclass
 class Search:
-    """Tried motions by stretch: the largest ratio of requirement to limit, and its actuator."""
+    """Search for the least factor of the path's times, `stretch`, at which motors and patches keep their limits.
+
+    `tried`, by stretch: the largest ratio of requirement to limit, and its actuator. `judge` finds these of a scene.
+    """
 
     scene: Scene
     analysis: TimedAnalysis
@@ -43,7 +46,7 @@ class Search:
     too_weak: tuple[str, ...] = ()  # motors whose torques at rest along the last motion exceed their limits
 
     def keeps_limits(self, stretch: float) -> bool:
-        """Whether the motion at this stretch does."""
+        """Whether all actuators keep their limits in the motion with its times multiplied by `stretch`."""
         if stretch not in self.tried:
             feasibility = self.judge(stretched(self.scene, stretch).model_copy(update={"analysis": (self.analysis,)}))
             factors = {"no motion along the path": inf} if feasibility is None else feasibility.factors
@@ -82,9 +85,9 @@ def fastest(scene: Scene, judge: Judge) -> tuple[Scene, str]:
 
 
 def least_stretch(keeps_limits: Callable[[float], bool], least: float, most: float) -> float | None:
-    """The least stretch in [least, most] that `keeps_limits`, to 0.5 %; None where there is none.
+    """The least factor of times in [least, most] with which `keeps_limits` is true, to 0.5 %; None without any.
 
-    From 1 on by factors until it lies between two, then halving their ratio.
+    From 1 on by factors until it lies between two, then by bisection of their ratio.
     """
     stretch, good, bad = min(max(1.0, least), most), 0.0, 0.0
     while not (good and bad):
@@ -102,7 +105,7 @@ def least_stretch(keeps_limits: Callable[[float], bool], least: float, most: flo
 
 
 def stretched(scene: Scene, stretch: float) -> Scene:
-    """Slow down the paths that are to be fastest by a factor."""
+    """The scene with the times of its paths with `fastest` multiplied by `stretch`."""
     paths = [one.changed(stretch=stretch, fastest=False) if one.fastest else one for one in scene.trajectory]
     return scene.model_copy(update={"trajectory": tuple(paths)})
 
@@ -153,7 +156,8 @@ def _names(scene: Scene) -> str:
 def with_paths(scene: Scene, model: Model, judge: Judge, stage: Callable[[str], None]) -> tuple[Scene, tuple[str, ...]]:
     """Return the scene with shapers for its frequencies and paths stretched to be `fastest`, and remarks.
 
-    `model` is what vibrates. Raises `InputError` where there are no such frequencies, or no motion keeps the limits.
+    Shapers are for the frequencies of `model`. `stage` is called with the name of each step. Raises `InputError` where
+    there are no such frequencies, or no motion keeps the limits.
     """
     tables = [(one, one.waypoints) for one in scene.trajectory if one.waypoints is not None]
     notes = list(dict.fromkeys(remark for _, table in tables for remark in table.remarks))

@@ -33,7 +33,7 @@ TIGHTEST = 1e-5  # tolerance: what is looked for is larger
 
 
 def with_finer_check(solution: Solution, watcher: Watcher) -> Solution:
-    """Return the solution with its analyses replayed on links with more modes, where the scene wants that check."""
+    """Return the solution with the inputs of analyses with `check = "finer"` simulated on links with more modes."""
     wanted = [name for name, run in solution.outcomes.items() if run.analysis.is_checked and run.status == "completed"]
     if not wanted:
         return solution

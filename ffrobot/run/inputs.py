@@ -19,7 +19,7 @@ PROGRAM = "ffrobot"
 
 
 def named_files(data: Any, folder: Path) -> Iterator[Path]:
-    """Yield the files that tables from a file in `folder` name, and those that link files among them name."""
+    """Yield the files that tables (`data`) of a TOML file in `folder` name, and files that these name in turn."""
     for key, file in _named(data, folder):
         yield from files_with_included(file)
         if key == "link":  # whose own links, which are none, are not followed: they might lead in a circle
@@ -36,12 +36,12 @@ def _named(data: Any, folder: Path) -> Iterator[tuple[str, Path]]:
 
 
 def python_files(tables: Mapping[str, Any], folder: Path) -> list[Path]:
-    """The Python files that the tables of a scene in `folder` name."""
+    """The Python files that the tables of a scene file in `folder` name."""
     return [file for key, file in _named(dict(tables), folder) if key == "python"]
 
 
 def read_tables(path: Path) -> dict[str, Any]:
-    """Tables of a TOML file; empty where it cannot be read, which others refuse."""
+    """Tables of a TOML file; {} where it cannot be read, which is an error elsewhere."""
     try:
         return parse_toml(read_text(path, "file"), path, "file")
     except InputError:
@@ -54,9 +54,9 @@ def files_of(path: Path) -> list[Path]:
 
 
 def fingerprints(scene: Mapping[str, Any], path: Path) -> dict[str, str]:
-    """SHA-256 of the content of everything that the tables `scene`, read from `path`, are made from.
+    """SHA-256 of all files that the tables `scene`, read from `path`, name, by file name; of the version by `PROGRAM`.
 
-    By the file's name, and `PROGRAM` for the version. TOML files count by their tables: comments change nothing.
+    Of TOML files that of their tables: comments change nothing.
     """
     files = dict.fromkeys(named_files(dict(scene), path.parent))
     prints = {PROGRAM: VERSION, str(path): digest_of_content(scene)}
@@ -71,6 +71,6 @@ def digest_of_file(path: Path) -> str:
 
 
 def changed(then: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
-    """Return names of what differs between two fingerprints, for files the last part."""
+    """Return the names of files (without folders), or `PROGRAM`, whose fingerprints differ."""
     names = sorted(name for name in then.keys() | now.keys() if then.get(name) != now.get(name))
     return list(dict.fromkeys(name if name == PROGRAM else Path(name).name for name in names))

@@ -29,9 +29,10 @@ SMALLEST = 1e-3  # of the largest peak of its kind: quantities below are measure
 
 
 def reported_modes(result: AnalysisResult) -> Reported:
-    """Return what `modes = "auto"` compares, (T, …) by kind and name: deflections (m), forces (N), voltages (V).
+    """Return the quantities (T, …) that `modes = "auto"` compares, by kind and name.
 
-    Torques of motors (N·m) as they are, moments on joints and paths over the largest length of links.
+    Deflections (m), forces (N), motor torques (N·m), voltages (V). Moments on joints and paths are divided by the
+    largest length of links.
     """
     run = result.run
     nodes = [node for node in run.model.tree.nodes if node.body.n_modes]
@@ -55,11 +56,11 @@ def reported_modes(result: AnalysisResult) -> Reported:
 
 
 def mode_levels(scene: Scene, bodies: Mapping[str, LoadedBody]) -> list[dict[str, Body]]:
-    """The flexible bodies with `modes` given, with more and more modes where that is "auto"; the last have all.
+    """Levels of the flexible bodies with a key `modes`, each with more modes where that is "auto"; the last has all.
 
-    A level has the modes up to one frequency, of all bodies: 1, 2, 3, 5, 8 … of each on average, of those that count.
-    These are the family with most modes: with those of one plane alone, both planes of bending come at once. In a
-    planar scene all modes count. `bodies` may have fewer modes already.
+    A level has the modes of all bodies up to one frequency: 1, 2, 3, 5, 8 … of each on average, counted in the family
+    with most modes, so that both planes of bending come at once. In a planar scene all modes count. `bodies` may have
+    fewer modes already.
     """
     wanted = {body.name: body.modes for body in scene.body if body.modes is not None}
     whole = {name: bodies[name].spatial.whole for name in wanted}
@@ -96,10 +97,10 @@ def mode_levels(scene: Scene, bodies: Mapping[str, LoadedBody]) -> list[dict[str
 
 @dataclass
 class ErrorEstimate:
-    """Errors of the last of several solves with more and more modes, from the differences of the last three.
+    """Relative errors of the last of several solves with more and more modes, from the differences of the last three.
 
-    Where these shrink by a ratio ρ from one to the next, the last solve is off by ρ/(1 − ρ) times the last difference.
-    The largest ratio of any kind counts for all kinds of an analysis, and more than the difference is never assumed.
+    Where differences shrink by a ratio ρ, the last solve is off by ρ/(1 − ρ) times the last difference. The largest
+    ratio of any kind counts for all kinds of an analysis, and more than the difference is never assumed.
     """
 
     last: Mapping[str, Reported] = field(default_factory=dict)
@@ -142,7 +143,7 @@ def _ratio(now: Mapping[str, float], before: Mapping[str, float]) -> float:
 
 
 def difference(now: Reported, before: Reported) -> dict[str, float]:
-    """Return, by kind, the largest difference of two solves relative to the peak of the quantity, `now`."""
+    """Return, by kind, the largest difference of two solves relative to the peak of the quantity in `now`."""
     errors = {}
     for kind, quantities in now.items():
         peaks = {name: np.abs(values).max(initial=0.0) for name, values in quantities.items()}
@@ -158,7 +159,7 @@ def difference(now: Reported, before: Reported) -> dict[str, float]:
 class ModeSearch:
     """Search for the number of modes that keeps the error tolerance of each analysis of a scene.
 
-    That of algebraic ones is by default the tightest of the integrated ones. `bodies`: with all modes, or fewer.
+    Algebraic analyses have by default the tightest tolerance of integrated ones. `bodies` have all modes, or fewer.
     """
 
     def __init__(self, scene: Scene, bodies: Mapping[str, LoadedBody]) -> None:
@@ -177,13 +178,13 @@ class ModeSearch:
 
     @property
     def bodies(self) -> Mapping[str, Body]:
-        """The bodies to solve with next; those of the solve to keep once it is over."""
+        """The bodies of the next solve; after the search, those of the solve to keep."""
         return self._levels[self._level]
 
     def add(self, reported: Mapping[str, Reported] | None, *, last: bool) -> None:
-        """Add the results, by analysis, of a solve with `bodies`; None where some of them did not complete.
+        """Add the results, by analysis, of a solve with `bodies`; None where an analysis did not complete.
 
-        It is the `last` one in any case where that is said.
+        `last`: the search ends with it in any case.
         """
         self._tried.append(sum(body.n_modes for body in self.bodies.values()))
         self._completed = reported is not None

@@ -49,10 +49,9 @@ def links_in_pieces(prepared: Prepared) -> dict[str, LinkInPieces]:
 
 
 def wanted_pieces(prepared: Prepared, runs: Sequence[Run]) -> dict[str, int]:
-    """Return the number of pieces for bodies with `pieces = "auto"` after a solve; empty if they have it.
+    """Return the number of pieces for bodies with `pieces = "auto"` after a solve; {} if they have enough.
 
-    What a piece loses of its length goes down with the square of their number. A run that failed has bent links
-    farther than they are.
+    The shortening of a piece falls with the square of their number. A run that failed bends links too far.
     """
     wanted, now, links = {}, {}, prepared.solved_links
     for body in prepared.scene.body:
@@ -68,9 +67,9 @@ def wanted_pieces(prepared: Prepared, runs: Sequence[Run]) -> dict[str, int]:
 
 
 def bending_of_links(prepared: Prepared, run: Run) -> dict[str, Bending]:
-    """Largest deflections in a run by flexible body (of links in pieces, the worst piece), and whether it divides.
+    """Largest deflections in a run by flexible body; of links in pieces, those of the worst piece.
 
-    In motion with the largest errors of any link for all: errors of one link move and load all others.
+    In motion every link has the largest errors of any: errors of one link move and load all others.
     """
     divided = prepared.divided
     link_of = {piece: name for name, body in divided.items() for piece in body.names}
@@ -109,7 +108,7 @@ def _is_divisible(scene: Scene, name: str) -> bool:
 
 
 def make_whole_links(prepared: Prepared) -> WholeLinks | None:
-    """What analyses have to know of whole links where the equations are those of pieces; None where none is divided."""
+    """The robot with whole links, for analyses whose equations have pieces; None where no link is divided."""
     if prepared.whole is None:
         return None
     divided = {}

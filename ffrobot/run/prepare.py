@@ -30,9 +30,9 @@ Bodies = Mapping[str, LoadedBody]
 
 
 def prepare_scene(scene: Scene | Path, watcher: Watcher | None = None) -> Solution:
-    """All that analyses of a scene, or of a scene file, start from: nothing solved, as few modes as it begins with.
+    """Bodies and equations of a scene, or a scene file, without results; with `modes = "auto"`, of the fewest modes.
 
-    Raises `InputError` as `solve_scene`.
+    Raises `InputError` for anything wrong with the scene or the files it names.
     """
     watcher = watcher or Watcher()
     if isinstance(scene, Path):
@@ -54,7 +54,7 @@ def prepare_scene(scene: Scene | Path, watcher: Watcher | None = None) -> Soluti
 
 
 def with_bodies(solution: Solution, spatial: Mapping[str, Body]) -> Solution:
-    """The scene with some of its bodies replaced, nothing solved yet. Raises `InputError` as `prepare_scene`."""
+    """The scene with bodies `spatial` in place of its own, without results. Raises `InputError` as `prepare_scene`."""
     scene, divided = solution.scene, solution.divided
     bodies, parts = (_with_equations(of, spatial) for of in (solution.bodies, solution.parts))
     made, points = make_patches(scene, bodies), points_3d(scene, bodies)
@@ -75,7 +75,7 @@ def _with_points(bodies: Bodies, points: Mapping[str, PointSet]) -> Bodies:
 
 
 def with_pieces(solution: Solution, counts: Mapping[str, int], watcher: Watcher) -> Solution:
-    """Divide the named bodies into the given numbers of pieces; returned unsolved, with equations of the pieces."""
+    """Divide bodies into `counts` pieces, by name; returned without results, with equations of the pieces."""
     divided = bodies_in_pieces(solution.scene, counts)
     if not divided and not solution.divided:
         return solution
@@ -101,7 +101,7 @@ def with_pieces(solution: Solution, counts: Mapping[str, int], watcher: Watcher)
 
 
 def unsolved(solution: Solution) -> Solution:
-    """The solution without results, its equations those of its scene, bodies and `stiffened`."""
+    """The solution without results, with new equations from its scene, bodies and `stiffened`."""
     stiffened = _all_stiffened(solution.scene, solution.stiffened)
     scene, bodies, patches = solution.scene, solution.bodies, solution.patches
     model, divided = _model(scene, bodies, patches, solution.divided, solution.parts, stiffened), solution.divided

@@ -29,14 +29,14 @@ class Prepared:
     """A scene in space before its analyses.
 
     Attributes:
-        scene, model: what is solved.
+        scene, model: the scene and its equations.
         bodies: by name.
         patches: by body.
         points: actuation points, by body.
         divided: bodies in pieces by name; then `model` is that of the pieces, whose bodies are `parts`, and `whole`
             that of the links.
         stiffened: whether all links have geometric stiffening.
-        wanted: datasets and groups of the results file, with their analysis, where these alone are needed; None: all.
+        wanted: "ANALYSIS/NAME" of the datasets and groups to which results are limited; None: all.
     """
 
     scene: Scene
@@ -64,7 +64,7 @@ class Prepared:
 
     @property
     def solved_links(self) -> dict[str, ModalBody]:
-        """Likewise of the bodies in the equations: pieces in place of their links."""
+        """The modal bodies in the equations: pieces in place of divided links."""
         return links_of(self.parts or self.bodies)
 
     @property

@@ -43,10 +43,10 @@ class FinerCheck:
     """Result of a forward simulation on links with twice the modes.
 
     Attributes:
-        modes: eigenmodes of each flexible body in it.
-        point: that is farthest from where the inverse analysis has it, of those on trajectories where there are any.
-        error: by how much, m, at worst.
-        status: how the replay ended.
+        modes: number of eigenmodes of each flexible body in it.
+        point: point with the largest distance from the inverse analysis, of those on trajectories if there are any.
+        error: this distance, m.
+        status: how the simulation ended.
         growth: mean rate, 1/s, at which the open loop multiplies deviations of the inverse analysis; nan if unknown.
         least_voltage: V, that tracking needs with these modes; None of other kinds.
     """
@@ -60,7 +60,7 @@ class FinerCheck:
 
     @property
     def in_words(self) -> str:
-        """Number of modes, largest deviation and least voltage as text."""
+        """Text with number of modes, largest deviation and least voltage."""
         ended = "" if self.status == "completed" else f", which ended early ({self.status})"
         modes = ", ".join(map(str, dict.fromkeys(self.modes.values()))) or "no"
         least = "" if self.least_voltage is None else f"; least voltage {self.least_voltage:.3g} V"
@@ -92,7 +92,7 @@ class Histories:
 
     @cached_property
     def actuation(self) -> Actuation | None:
-        """What patches have to do, and whether motors and patches can; None where nothing is asked of them."""
+        """Requirements on motors and patches, and whether they keep their limits; None if nothing is prescribed."""
         run, prepared = self.run, self.prepared
         if actuator_forces(run) is None or not run.analysis.is_motion:
             return None
@@ -122,12 +122,12 @@ class AnalysisResult:
 
     Attributes:
         prepared: the scene.
-        run: its motion, with forces that redundant constraints share, and how it went.
-        histories: what has peaks.
+        run: its motion and statistics, with least-squares multipliers of redundant constraints.
+        histories: quantities with peaks, also between outputs.
         commanding: the run whose paths it follows: itself, or the one that it replays.
-        sharing: reactions that redundant constraints leave open; None where there are none.
-        check: what a replay on finer links found, where that is asked for.
-        deviations: what is left of it where the robot is not its model, where that is asked for.
+        sharing: reactions that redundant constraints leave undetermined; None where there are none.
+        check: result of `check = "finer"`; None without this key.
+        deviations: table of `robustness`; None without this key.
     """
 
     prepared: Prepared = field(repr=False)
@@ -162,7 +162,7 @@ class AnalysisResult:
         return any(self.prepared.wants(f"{self.analysis.name}/{name}") for name in names)
 
     def having(self, **others: Any) -> Self:
-        """The same with other values of its fields, and with all that is evaluated."""
+        """The result with other values of its fields; quantities that are already evaluated are kept."""
         made = copy(self)
         vars(made).update(others)
         return made
@@ -180,7 +180,7 @@ class AnalysisResult:
 
     @cached_property
     def bending(self) -> Mapping[str, Bending]:
-        """How far flexible bodies leave small deformations, and what loads do to their stiffness."""
+        """By flexible body: largest deflection, change of stiffness by loads, and estimated errors by both."""
         return bending_of_links(self.prepared, self.histories.run)
 
     @cached_property
@@ -199,9 +199,9 @@ class AnalysisResult:
 
     @cached_property
     def predicted_shift(self) -> Mapping[str, Array]:
-        """Shift (T, 3), m, of all points by modal forces that nothing supplies; of links in pieces that of the links.
+        """Estimated shift (T, 3), m, of each point by modal forces that no actuator supplies.
 
-        Empty without such forces, and where the joints of whole links cannot say how the pieces move.
+        {} without such forces, and where joints between pieces have no coordinates in whole links.
         """
         run, of = self.run, self.histories
         asked, forces = of.actuation, actuator_forces(of.run)
@@ -244,7 +244,7 @@ class AnalysisResult:
 
     @property
     def start_jolt(self) -> float:
-        """Relative jump of acceleration at the start; see `attachment_error`."""
+        """Share of the largest deformation that vibrates from the start on (`attachment_error.start_errors`)."""
         return self._start_errors[0]
 
     @cached_property
@@ -306,11 +306,11 @@ class ModeChoice:
     """Result of the search for the number of modes.
 
     Attributes:
-        errors: estimated error that leaving out modes makes of the largest quantity of each kind, relative to its peak,
-            by analysis and kind; 0 where all modes of the files were needed.
-        before: likewise, how much the last solve differs from the one before it.
+        errors: estimated error by omitted modes of the largest quantity of each kind, relative to its peak, by analysis
+            and kind; 0 where all modes of the files were needed.
+        before: likewise, the difference between the last two solves.
         tried: numbers of modal coordinates of all bodies together in the solves; the last is the one kept.
-        seconds: of the solves before the last.
+        seconds: wall time of the solves before the last.
         highest: ω (rad/s) of the highest mode kept, and of the highest there is.
     """
 
@@ -326,13 +326,13 @@ class Solution(Prepared):
     """Everything a solve of a scene in space computed.
 
     Attributes:
-        analyses: by name, in the order of the scene.
+        analyses: results by name, in the order of the scene.
         seconds: wall time by stage.
-        failure: what ended the run after these analyses; None where all ran, or the last of them did not complete.
-        unread: the run of the analysis of which outputs failed; its integration is kept.
-        path_notes: what was found of paths before the analyses, one line each.
-        earlier: runs of analyses to go on with, from a results file: see `results.solving`.
-        mode_choice: where `modes = "auto"`.
+        failure: the error that ended the run after these analyses; None without one.
+        unread: the run of an analysis whose integration succeeded and whose outputs failed.
+        path_notes: remarks on paths, such as the factor of `fastest`, one line each.
+        earlier: runs of analyses that are resumed, from a results file.
+        mode_choice: result of the search for `modes = "auto"`.
     """
 
     analyses: Mapping[str, AnalysisResult] = field(default_factory=dict)
@@ -350,6 +350,6 @@ class Solution(Prepared):
         return {run.analysis.name: run for run in runs}
 
     def goes_on(self, outcome: Run) -> bool:
-        """Whether `outcome` is of use to `resume`; a search for modes or pieces has its own bodies and starts again."""
+        """Whether `outcome` can be resumed; not with bodies of a search for modes or pieces, which starts again."""
         searched = any("auto" in (body.modes, body.pieces) for body in self.scene.body)
         return not searched and outcome.analysis.is_resumable

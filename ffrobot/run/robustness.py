@@ -36,13 +36,13 @@ LOOSEST = 1e-6  # tolerance of the simulations: open-loop arms add up errors
 
 @struct
 class Deviations:
-    """Largest distance (m) of the tip from the computed motion, by lane, of each cause.
+    """Largest distance (m) of the tip from the computed motion in simulations with one cause of deviation each.
 
-    NaN where that has no meaning, infinite where the simulation ended early. `bandwidth` (rad/s): of the controller.
+    NaN where it has no meaning, infinite where the simulation ended early. `bandwidth` (rad/s): of the controller.
     """
 
     causes: tuple[str, ...]
-    lanes: Mapping[str, Array]  # (causes,)
+    lanes: Mapping[str, Array]  # (causes,) by use of the inputs: "open_loop", "joint_control", …
     bandwidth: float
 
 
@@ -84,7 +84,7 @@ def deviations(context: ActuatedContext, source: Run) -> Deviations:
 
 
 def varied_robots(model: Model, asked: Robustness) -> Iterator[tuple[str, Model]]:
-    """Robots with other links and gears, by cause: the same for both signs."""
+    """Yield cause and robot with other stiffness or mass of links, or stiffness of gears; both signs have one cause."""
     scene, bodies = model.scene, _bodies(model)
     for what in ("stiffness", "mass"):
         for share, factor in _both_ways(asked.parameters):

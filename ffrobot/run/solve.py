@@ -44,9 +44,9 @@ def solve_scene(
 ) -> Solution:
     """Run every analysis of a scene or a scene file; stage 1 runs first for links that are out of date.
 
-    An analysis that does not reach its end, or is stopped by Ctrl-C, is kept as far as it got and ends the run
-    (`Run.check_completed`). `keep` gets what there is before an error is raised. Nothing is evaluated for the results
-    file but what is `wanted` (see `Prepared`).
+    An analysis that does not reach its end, or is stopped by Ctrl-C, is kept up to there and ends the run
+    (`Run.check_completed`). `keep` is called with the solution, also before an error is raised. Only datasets and
+    groups `wanted`, "ANALYSIS/NAME", are evaluated for the results file; None: all.
     Raises `InputError` for anything wrong with the scene or the files it names, `SolveError` where no state is found.
     """
     watcher = watcher or Watcher()
@@ -54,7 +54,7 @@ def solve_scene(
 
 
 def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None) -> Solution:
-    """Run the analyses of a prepared solution; they resume from `solution.earlier` if present."""
+    """Run the analyses of a prepared solution, from `solution.earlier` on where present; `keep` as in `solve_scene`."""
     scene, model = solution.scene, solution.model
     check_turning(model)
     checked = [analysis.name for analysis in scene.analysis if analysis.is_checked]

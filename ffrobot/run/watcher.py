@@ -12,29 +12,29 @@ from ..common.interrupts import SIGNALS, EndOfCommand
 class Watcher:
     """Observes the progress of a solve. The command line shows it; library users may omit it.
 
-    `signal` is the number of the one that requested an end; 0 without one.
+    `signal` is the number of the signal that requested an end; 0 without one.
     """
 
     signal = 0
 
     def stage(self, title: str) -> None:
-        """A step begins that may take long."""
+        """Called when a step named `title` begins that may take long."""
 
     def advance(self, t: float, end: float) -> bool:
-        """An analysis has reached time t of `end`, s; False stops it."""
+        """Called when an analysis has reached time t of `end`, s; return False to stop it."""
         return True
 
     def stopping(self, number: int) -> None:
-        """Signal `number` requests an end: computed results are kept, unless another signal follows."""
+        """Called when signal `number` requests an end: computed results are kept, unless another signal follows."""
         self.signal = number
 
 
 class Interruption:
     """Within its context the first Ctrl-C (or SIGTERM) only sets `requested`; the next one interrupts as usual.
 
-    Otherwise `KeyboardInterrupt` would come anywhere, in calls from the core too, and lose the outputs so far. While
-    `at_once` is set, by analyses without outputs yet, the first one interrupts, too; `keeps`: analyses before them have
-    results. Signals reach the main thread only: in any other the context does nothing.
+    Else `KeyboardInterrupt` would come anywhere, in calls from the core too, and lose the outputs so far. With
+    `at_once`, of analyses without outputs yet, the first signal interrupts, too; `keeps`: analyses before have results.
+    Signals reach the main thread only: in others the context does nothing.
     """
 
     at_once = keeps = False
@@ -56,7 +56,7 @@ class Interruption:
             self._restore()
 
     def advance(self, t: float, end: float) -> bool:
-        """The watcher's, of an analysis that has outputs up to time t; False stops it."""
+        """Call the watcher's `advance` at time t of `end`, s; False, which stops the analysis, also after a signal."""
         self.at_once = False
         return self.watcher.advance(t, end) and not self.requested
 
