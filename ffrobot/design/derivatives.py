@@ -1,7 +1,7 @@
 """Derivatives of responses from values beside a point, with errors.
 
-The derivative is that of the polynomial through the values, exact for n − 1 as its degree (Fornberg, Mathematics of
-Computation 51, 1988): with steps h, h/2 and h/4 to both sides Richardson's extrapolation, of order h⁶.
+The derivative is that of the polynomial through the values (Fornberg, Mathematics of Computation 51, 1988): with steps
+h, h/2 and h/4 to both sides Richardson's extrapolation, of order h⁶.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,12 +17,12 @@ from .designs import Point, moved
 from .readings import Reading, Response
 
 LEVELS = 3  # sizes of steps that one extrapolation takes at most
-NOISE = 3.0  # times what one divided difference says of it: with luck it says little
+NOISE = 3.0  # times a divided difference, which may be small by chance
 ROUND_OFF = float(np.finfo(np.float64).eps)
 
 
 class Derivative(NamedTuple):
-    """A derivative, the estimate of its error, and the largest step it was made with; NaN where there is none."""
+    """A derivative, its estimated error, and the largest step used; NaN where there is none."""
 
     value: float
     error: float
@@ -30,7 +30,7 @@ class Derivative(NamedTuple):
 
 
 def weights(offsets: Array) -> Array:
-    """Return weights w (n,) of f'(0) ≈ Σ w_i f(x_i), 1/unit of x: Σ w_i x_iᵏ is 1 for k = 1 and 0 for other k < n."""
+    """Return weights w (n,), 1/unit of x, of f'(0) ≈ Σ w_i f(x_i) at `offsets` x (n,): exact for degrees below n."""
     size = np.abs(offsets).max()
     powers = np.vander(offsets / size, increasing=True).T
     first = np.zeros(len(offsets))
@@ -39,13 +39,13 @@ def weights(offsets: Array) -> Array:
 
 
 def derivative(offsets: Array, values: Array) -> Derivative:
-    """Return the derivative at 0 from `values` (n,) at `offsets` (n,); NaN values are omitted.
+    """Return the derivative at 0 from `values` (n,), in any unit, at `offsets` (n,); NaN values are omitted.
 
-    Steps are taken two and three sizes at a time; those whose estimate of the error is least make the derivative
+    Steps are taken two and three sizes at a time; those with the least estimated error make the derivative
     (Ridders, Advances in Engineering Software 4, 1982). One side is enough, at a lower order.
 
-    The estimate has two parts. Truncation: how far the derivative without the largest steps is off, which is of lower
-    order. Noise of the values: by their divided difference of the highest order, 0 of polynomials of lower degree.
+    The estimate adds truncation, the difference from the derivative without the largest steps, and noise, by the
+    divided difference of the highest order.
     """
     known = np.isfinite(values)
     offsets, values = offsets[known], values[known]
@@ -70,17 +70,17 @@ def derivative(offsets: Array, values: Array) -> Derivative:
     return best
 
 
-AIM = 1e-5  # estimated error, of the largest percent per percent of a response, or of 1, that needs no other steps
-RESOLVING = 8.0  # times nearer are values between outputs, at least, than with every second output
+AIM = 1e-5  # estimated error, of a response's largest percent per percent or 1, that is small enough
+RESOLVING = 8.0  # least ratio of errors between outputs: with every second output, and with all
 ROUGH = 1e-2  # of a derivative: beyond, the response is hardly smooth
 
 
 @dataclass(frozen=True)
 class Base:
-    """Where derivatives are taken: k `keys` with their values `point`, and g `responses` with their `readings`.
+    """Point of differentiation: k `keys` with their values `point`, and g `responses` with their `readings`.
 
-    `steps` (k) are the largest ones. `repeats`: the tolerance of runs that take the steps of the scene's own again; 0
-    where they choose their own. `again`: the changes of their scenes with which they do.
+    `steps` (k): largest change of each key. Runs with other keys reuse the time steps of the scene's own run by the
+    changes `again` to their scenes; `repeats` is then their tolerance. Otherwise, `repeats` is 0.
     """
 
     responses: tuple[Response, ...]
@@ -98,7 +98,7 @@ class Base:
 
 @dataclass(frozen=True)
 class Sample:
-    """Key number `k` changed by `offset`: the responses there, none where the run failed, and why it did."""
+    """A run with key number `k` changed by `offset`: its responses, or none and the message of its `failure`."""
 
     k: int
     offset: float
@@ -107,15 +107,15 @@ class Sample:
 
 
 Method = Literal["differences", "repeated steps", "one-sided", "none"]
-"""Method of a derivative; "repeated steps": differences of runs with the same steps of integration."""
+"""Method of a derivative; "repeated steps": differences of runs with the same time steps."""
 
 
 @dataclass(frozen=True)
 class Entry:
-    """∂response/∂key with the estimate of its error, both in SI units, NaN where there is none.
+    """∂response/∂key with its estimated error, both in SI units, NaN where there is none.
 
-    `method`: one of `Method`; `step`: the largest one used; `notes`: restrictions; `unresolved`: the part of the error
-    due to the distance of outputs, which no other step reduces.
+    `step`: largest change of the key; `notes`: restrictions; `unresolved`: the part of the error due to the distance
+    of outputs, which no other step reduces.
     """
 
     derivative: float
@@ -132,7 +132,7 @@ def entries(base: Base, samples: Sequence[Sample]) -> tuple[tuple[Entry, ...], .
 
 
 def rough_keys(base: Base, samples: Sequence[Sample], *, smaller: bool) -> list[int]:
-    """Return numbers of keys with errors above `AIM` whose best derivative has the smallest (or largest) step."""
+    """Return numbers of keys with errors above `AIM` where a smaller (or larger) step may lower the error."""
     rough = set()
     for g, row in enumerate(entries(base, samples)):
         largest = max((_relative(one.derivative, base, g, k) for k, one in enumerate(row)), key=np.nan_to_num)
@@ -152,7 +152,7 @@ def _entry(base: Base, g: int, k: int, all_samples: Sequence[Sample]) -> Entry:
     slope = derivative(offsets, np.array([nominal.value, *(one.value for one in beside)]))
     by_coarse = derivative(offsets, np.array([nominal.coarse, *(one.coarse for one in beside)])).value
     unresolved = abs(by_coarse - slope.value) / RESOLVING if np.isfinite(by_coarse) else 0.0
-    # Steps that are the same for all runs err alike: no difference of runs tells of that.
+    # Runs with the same steps have equal errors, which differences do not show.
     size = abs(nominal.value) / (abs(base.point[k]) or 1.0)
     slope = slope._replace(error=slope.error + unresolved + base.repeats * max(abs(slope.value), size))
     method: Method = "repeated steps" if base.repeats else "differences"

@@ -30,18 +30,18 @@ from ..sweep.runs import RESULTS, Row
 from ..sweep.sweep import Key, Sweep, check_point, claim_folder, forget_failures, number, run_sweep
 from .readings import Reading, Response
 
-OUTPUTS = 1000  # at least, where responses are peaks or means over time: they do not depend on those of the scene
+OUTPUTS = 1000  # at least, if responses depend on histories
 ALGEBRAIC = ("static", "pcid")
-"""Kinds of analysis that, where they take no steps, solve equations to round-off at every time."""
+"""Kinds of analysis that, without time steps, solve equations to round-off at every time."""
 
 
 def changes_for(
     path: Path, responses: Sequence[Response], tolerance: float | None, *, keep_steps: bool = False
 ) -> dict[Key, Any]:
-    """Return changes of the scene at `path`: only analyses that responses or these need, with `tolerance` or less.
+    """Return changes of the scene at `path`: only analyses that `responses` need, with `tolerance` or less.
 
-    Responses need the analysis that they name, by default the first. Replays of inverse analyses on finer links, which
-    change no result, are left out too. There are `OUTPUTS` at least. `keep_steps`: of integrations.
+    Responses need the analysis that they name, by default the first, and its sources. Checks of inverse analyses are
+    omitted. There are at least `OUTPUTS` outputs. `keep_steps`: whether results contain the time steps.
     """
     scene = load_scene(path)
     names = [one.name for one in scene.analysis]
@@ -66,14 +66,14 @@ def changes_for(
 
 
 def may_repeat(keys: Sequence[Key]) -> bool:
-    """Whether runs with other values of `keys` can take the same steps; keys of analyses change them."""
+    """Whether runs with other values of `keys` can reuse time steps; keys of analyses change them."""
     return not any(key[0] == "analysis" for key in keys)
 
 
 def repeated_steps(results: Results) -> dict[Key, Any] | None:
-    """Return changes of a scene with which its integrations take the steps of the run with these `results` again.
+    """Return changes of a scene with which its integrations reuse the time steps of the run with these `results`.
 
-    None where one of them cannot be repeated; nothing where none is integrated, and differences are smooth anyway.
+    None if an analysis cannot; no changes if none is integrated, as its results depend smoothly on keys anyway.
     """
     about = {name: results.attributes(name) for name in results.analyses}
     stepping = [name for name in about if about[name]["steps"]]
@@ -102,7 +102,7 @@ def in_words(keys: Iterable[Key], point: Point) -> str:
 class Runs:
     """Settings of the runs of designs: scene file, folder (`kept` or temporary), the batch that performs them.
 
-    `retry`: whether what failed in an earlier command is run again.
+    `retry`: whether to repeat designs that failed before.
     """
 
     path: Path
@@ -124,9 +124,9 @@ def runs_of(
     allow_python: Sequence[AnyPath] = (),
     watcher: Watcher | None = None,
 ) -> Iterator[Runs]:
-    """Runs of a scene file in the folder `output`, or in a temporary one; no output replaces an input.
+    """Context with `Runs` of a scene file in the folder `output`, or a temporary one; inputs cannot be overwritten.
 
-    They are the jobs of `executor`, or of so many `processes` here. Raises `InputError` for neither under mpirun.
+    `executor` performs the runs, else `processes` on this machine. Raises `InputError` without it under mpirun.
     """
     if executor is None and of_mpi() > 1:
         raise InputError("executor: expected one under mpirun, as of mpi4py.futures.MPICommExecutor", "none")
@@ -143,7 +143,7 @@ def runs_of(
 
 @dataclass(frozen=True)
 class Design:
-    """One run: its row in the table, and where its results are; of all `asked` is what was read of them."""
+    """One run: its row in the table, the folder of its results, and the names `asked` of datasets read so far."""
 
     row: Row
     folder: Path
@@ -156,12 +156,12 @@ class Design:
 
     @property
     def completed(self) -> bool:
-        """Whether its results are whole."""
+        """Whether its results are complete."""
         return self.row.status == "completed"
 
     @property
     def failure(self) -> str:
-        """Why its results are incomplete; empty if they are whole."""
+        """Reason why its results are incomplete; empty if they are complete."""
         return "" if self.completed else f"{self.row.status}: {self.row.message}"
 
     def results(self) -> Results:
@@ -171,12 +171,12 @@ class Design:
         return results
 
     def read(self, responses: Iterable[Response]) -> tuple[Reading, ...]:
-        """Responses of a completed design. Raises `InputError` where its results do not have them."""
+        """Return responses of a completed design. Raises `InputError` if its results lack them."""
         with self.results() as results:
             return tuple(response.read(results) for response in responses)
 
     def follow(self, responses: Sequence[Response], readings: Sequence[Reading]) -> tuple[Reading, ...]:
-        """Responses at the places that another design's `readings` have; empty where this design failed."""
+        """Return responses at the time, column or mode of another design's `readings`; empty if this one failed."""
         if not self.completed:
             return ()
         with self.results() as results:
@@ -188,9 +188,9 @@ class SpentError(Exception):
 
 
 class Designs:
-    """All designs so far of the scene of `runs`, by the values of `keys`, which the scene has `own` ones of.
+    """All designs so far of the scene of `runs`, by values of `keys`; `own`: the values in the scene itself.
 
-    `fixed` are changes that they share; there may be `most` designs.
+    `fixed`: changes of the scene in all designs. `most`: largest number of designs.
     """
 
     def __init__(
@@ -223,7 +223,7 @@ class Designs:
         return {one.point: one.failure for one in self._designs.values() if not one.completed}
 
     def problem(self, *points: Point) -> str:
-        """Return the error of the scene or a link file that all `points` have, before any run; "" if there is none."""
+        """Return an input error, found without a run, if all `points` have one; "" otherwise."""
         text = ""
         for point in points:
             try:
@@ -234,7 +234,7 @@ class Designs:
         return text
 
     def run_first(self, point: Point) -> Design:
-        """The design at `point`. Raises `InputError` or `SolveError` where it does not complete."""
+        """Run the design at `point`. Raises `InputError` or `SolveError` if it does not complete."""
         (design,) = self.run([point])
         if not design.completed:
             error = InputError if design.row.status == "wrong input" else SolveError
@@ -242,10 +242,10 @@ class Designs:
         return design
 
     def run(self, points: Sequence[Point], changes: Mapping[Key, Any] | None = None) -> list[Design]:
-        """Solve the designs at `points` with `changes` in addition, failed ones included; none twice in one folder.
+        """Return designs at `points` with `changes` in addition, failed ones included; each is run once.
 
-        What is read of the first ones is all that the results of the others have. Raises `InputError` where the scene
-        or its files have changed since, `SpentError` where designs would be too many.
+        Later results contain only datasets that were read from the first ones. Raises `InputError` if the scene or
+        its files have changed since, `SpentError` for too many designs.
         """
         claim_folder(self._sweep)
         imported = {name: one.row.inputs[name] for one in self._designs.values() for name in one.row.imported}
@@ -267,7 +267,7 @@ class Designs:
         return [self._designs[folder] for folder in folders]
 
     def whole(self, design: Design) -> Design:
-        """The completed design with all results: solved again if it has only those that were read of others."""
+        """Return a completed design with all results; solved again if it has only some datasets."""
         if not design.row.wanted:
             return design
         earlier = tuple(one.row for one in self._designs.values() if one is not design)
@@ -281,7 +281,7 @@ def _digests(path: Path) -> dict[str, str]:
 
 
 def parse_key(text: str, option: str) -> Key:
-    """Return the parts of a key such as `payload.0.mass`. Raises `InputError` if `text` is none."""
+    """Return the parts of a key such as `payload.0.mass`. Raises `InputError` for other text."""
     parts = tuple(text.strip().split("."))
     if not all(parts) or len(parts) > DEEPEST:
         raise InputError(f"{option}: expected a key such as payload.0.mass", f'"{text[:100]}"')

@@ -1,19 +1,16 @@
-"""Designs at places of the unit cube, each run once: responses, gradients, how near to an optimum, all in one table.
+"""Designs at places of the unit cube, each run once: responses, gradients, conditions of optimality, one table.
 
-With the objective F to be least, excesses g ≤ 0 and bounds b of u: ∇F + Σ λ_i ∇g_i + Σ μ_j ∇b_j = 0 with λ, μ ≥ 0, and
-0 where a limit or bound is not reached (Karush, Kuhn and Tucker). Of the gradients there are, the multipliers that come
-nearest to it are taken (Lawson & Hanson's least squares without negative values: Solving Least Squares Problems, 1974,
-chapter 23). One unit more room in g_i lowers F by λ_i.
+An optimum of objective F, excesses g ≤ 0 and bounds b has ∇F + Σ λ_i ∇g_i + Σ μ_j ∇b_j = 0 with λ, μ ≥ 0, and 0 where
+a limit or bound is not reached (Karush, Kuhn and Tucker). The multipliers are the nonnegative least-squares solution
+(Lawson & Hanson, Solving Least Squares Problems, 1974, chapter 23). One unit more room in g_i lowers F by λ_i.
 
-Gradients are from few runs: one design beside for each variable, or a central pair. The step follows from the noise ε
-of the runs: with h = 2 √ε of a number, noise and curvature of a one-sided difference are alike (Gill, Murray & Wright,
-Practical Optimization, 1981, section 8.6). Where designs beside take the steps of the base again
-(`mbs/fields/field_types.py`), ε is round-off, and one-sided differences are all that is wanted. One more run has all
-numbers changed at once, to the other sides: what it leaves of the sum of the differences tells their error.
+Gradients take one further design for each variable, or a central pair. With the noise ε of the runs and a step of
+h = 2 √ε of a number, noise and curvature of a one-sided difference are alike (Gill, Murray & Wright, Practical
+Optimization, 1981, section 8.6). If runs reuse time steps (`mbs/fields/field_types.py`), ε is round-off, and one-sided
+differences suffice. One more run has all numbers changed at once, to the other sides, and shows their error.
 
-Runs that choose their own steps differ by their tolerance. There the first gradient of a search takes pairs; their
-second differences take the curvature out of later one-sided ones. Peaks are followed at their own time (envelope
-theorem).
+Otherwise runs differ by their tolerance. The first gradient of a search then takes pairs, whose second differences
+correct later one-sided ones. Derivatives of peaks are those at their own time (envelope theorem).
 """
 
 from collections.abc import Mapping, Sequence
@@ -38,9 +35,9 @@ from .variables import DesignSpace, Place
 
 @dataclass(frozen=True)
 class Evaluated:
-    """Design at one point: `readings` of all responses, or none and the `failure` that tells why.
+    """Design at one place of the unit cube: `readings` of all responses, or none and the message of its `failure`.
 
-    `again`: changes of scenes beside it with which runs take its steps again; None where they choose their own.
+    `again`: changes with which runs of other designs reuse its time steps; None if they cannot.
     """
 
     place: Place
@@ -56,7 +53,7 @@ class Evaluated:
 
     @property
     def values(self) -> tuple[float, ...]:
-        """Values of all responses, in SI units."""
+        """Values of all responses, SI units."""
         return tuple(reading.value for reading in self.readings)
 
 
@@ -81,7 +78,7 @@ class Evaluations:
         return [f"{in_words(self.space.keys, point)}: {why}" for point, why in failures.items()]
 
     def at(self, places: Sequence[Place]) -> list[Evaluated]:
-        """Return designs at places of the unit cube, run once. Raises `SpentError` if that would be too many."""
+        """Return designs at places of the unit cube, each run once. Raises `SpentError` for too many designs."""
         points = [self.space.point(place) for place in places]
         new = {point: place for place, point in zip(places, points, strict=True) if point not in self._searched}
         for (point, place), design in zip(new.items(), self.designs.run(list(new)), strict=True):
@@ -91,9 +88,9 @@ class Evaluations:
     def beside(
         self, base: Evaluated, places: Sequence[Place], again: Mapping[Key, Any] | None
     ) -> list[tuple[Reading, ...]]:
-        """Responses of neighbours of `base`, peaks taken at its peak times; empty where a design failed.
+        """Return responses at places close to `base`, those of peaks at its peak times; empty if a design failed.
 
-        `again`: changes with which runs take the steps of the base.
+        `again`: changes with which runs reuse the time steps of `base`.
         """
         designs = self.designs.run([self.space.point(place) for place in places], again)
         known = [(base.place, design.folder) for design in designs]
@@ -120,7 +117,7 @@ class Evaluations:
 
 
 def write_designs(tried: Evaluations, path: Path) -> None:
-    """Write one line for each design of a search: values of keys and responses, largest excess of a limit, folder."""
+    """Write a CSV line for each design of a search: values of keys and responses, largest excess of a limit, folder."""
     problem = tried.problem
     responses = [problem.objective.text, *(limit.text for limit in problem.limits)]
     columns = ["design", *map(".".join, tried.space.keys), "status", *responses, "violation", "folder", "message"]
@@ -134,7 +131,7 @@ def write_designs(tried: Evaluations, path: Path) -> None:
 
 
 Beside = dict[float, Sequence[Reading]]
-"""Responses beside a design by the offset of one coordinate."""
+"""Responses close to a design, by the offset of one coordinate."""
 
 ROUND_OFF = 1e-11  # of responses: differs between runs with the same steps
 DOUBTFUL = 1e-2  # of differences: what the run with all of them may leave
@@ -142,10 +139,10 @@ DOUBTFUL = 1e-2  # of differences: what the run with all of them may leave
 
 @dataclass(frozen=True)
 class Slopes:
-    """Gradients at one design: `gradient` (r, n) of r responses by n unit-cube coordinates, and its estimated `error`.
+    """Gradients at one design: `gradient` (r, n), SI units, of r responses by n unit-cube coordinates; `error` alike.
 
-    Coordinates of catalogs have NaN, and those without a design beside that completes. `kinks`: peaks that others
-    overtake beside the design, in words.
+    NaN for coordinates of catalogs, and where no design close by completes. `kinks`: notes on peaks that others
+    exceed close to the design.
     """
 
     gradient: Array
@@ -154,10 +151,10 @@ class Slopes:
 
 
 class Differentiation:
-    """Gradients in one search; `tolerance` of its runs.
+    """Gradients in one search by finite differences; `tolerance` of its runs.
 
-    `repeats`: whether designs beside take the steps of the base again, where they can: until differences so made turn
-    out to be none. `curvature` (r, n) holds the second derivatives that the last central pairs gave, NaN before.
+    `repeats`: whether runs reuse time steps where they can; ends if such differences turn out to be inaccurate.
+    `curvature` (r, n), SI units: second derivatives from the last central differences, NaN before.
     """
 
     def __init__(self, evaluations: Evaluations, tolerance: float) -> None:
@@ -165,7 +162,7 @@ class Differentiation:
         self.curvature = np.full((len(evaluations.problem.responses), len(evaluations.space.variables)), np.nan)
 
     def slopes(self, base: Evaluated, *, judged: bool = False) -> Slopes:
-        """Return gradients at a completed design; `judged`: with an error estimate from further runs."""
+        """Return gradients at a completed design; `judged`: whether further runs estimate their errors."""
         wanted = self.evaluations.space.numbers
         if self.repeats and base.again is not None and wanted:
             slopes = self._by_repeated_steps(base, wanted, judged=judged or not self._tried)
@@ -252,8 +249,8 @@ class Differentiation:
         return Slopes(gradient, error, tuple(kinks))
 
 
-ACTIVE = 1e-4  # of a limit, or of a number's range: what is nearer counts as reached
-CLOSED = 1e-2  # of the gradient that an optimum may have: room that limits may have there, in the objective
+ACTIVE = 1e-4  # of a limit, or of a number's range: nearer ones count as reached
+CLOSED = 1e-2  # of the gradient at an optimum: largest `gap` there
 
 
 @dataclass(frozen=True)
@@ -261,14 +258,14 @@ class Optimality:
     """Conditions of optimality (Karush, Kuhn, Tucker) at one design, in the scaled problem.
 
     Attributes:
-        limits: (m) multipliers λ of limits; NaN of those that are not reached.
-        bounds: (n) multipliers μ of bounds, of lower ones negative; NaN where a number is between its bounds.
-        residual: the largest entry of the gradient of the Lagrangian: the part of the objective that the range of one
-            number would change if all were linear.
-        gradient_error: the largest estimate of an error in the gradient of F, in the same measure.
-        gap: how much lower the objective would be, if all were linear, with no room left in limits that are reached.
-        violation: the largest excess, of its limit.
-        kinks: of peaks, in words.
+        limits: (m) multipliers λ of limits, no unit; NaN for limits that are not reached.
+        bounds: (n) multipliers μ of bounds, no unit, negative for lower ones; NaN for numbers between their bounds.
+        residual: largest entry of the gradient of the Lagrangian: relative change of the objective over the range of
+            one number, if all were linear.
+        gradient_error: largest estimated error in the gradient of the objective, in the same measure.
+        gap: relative decrease of the objective, if all were linear, with no room left in limits that are reached.
+        violation: largest excess, relative to its limit.
+        kinks: notes on peaks that others exceed close to the design.
     """
 
     limits: Array
@@ -280,7 +277,7 @@ class Optimality:
     kinks: tuple[str, ...]
 
     def reached(self, aim: float) -> bool:
-        """Whether this is an optimum, with no larger gradient than `aim`."""
+        """Whether this is an optimum: `residual` is at most `aim`, and limits are satisfied."""
         return self.residual <= aim and self.gap <= CLOSED * aim and self.violation <= KEPT
 
 

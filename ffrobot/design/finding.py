@@ -1,4 +1,4 @@
-"""What the design commands find, whatever it is: printed, written as tables and drawn in one way."""
+"""Base of the results of design commands: printing, tables and figures."""
 
 import re
 from abc import ABC, abstractmethod
@@ -21,7 +21,7 @@ from ..present.lines import print_table
 
 
 class TextTable(NamedTuple):
-    """A table of text: in print below a `line`; on the page of a report its heading begins with `of`."""
+    """A table of text: below a `line` in print; in reports its heading begins with `of`."""
 
     heading: Sequence[str]
     rows: Iterable[Sequence[str]]

@@ -1,7 +1,7 @@
 """Searches along gradients from one start; all rows of catalogs; differential evolution.
 
-A design that fails reads as far worse than the last one that did not, with its excesses: SLSQP's line search and
-trust-constr's radius then shorten the step towards that one.
+A failed design counts as far worse than the last complete one: SLSQP's line search and trust-constr's radius then
+shorten the step.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,13 +20,13 @@ from .responses import KEPT
 from .variables import DesignSpace, Place
 
 AIM = 1e-4  # gradient of the Lagrangian, of the objective over a number's range, at an optimum
-FAILED = 1e3  # how much worse a design that fails reads than the last good one, of the objective's size
+FAILED = 1e3  # how much worse a failed design counts, of the objective's size
 ENOUGH = 0.5  # times that: where a search ends, before more runs judge it
 DOWN = 0.05  # of the gradient since it was judged last: is judged again
-FAR = 1e-2  # violation up to which an optimizer is left to itself: limits that it follows are always exceeded a little
+FAR = 1e-2  # violation that an optimizer may have: limits that it follows are exceeded a little
 NEARER = 0.9  # of the violation: much less
 PATIENCE = 4  # gradients without that: the violation itself is made less
-SHORTEST = 1e-6  # step of SLSQP, of a range: its line search refuses steps where a limit trades for the objective
+SHORTEST = 1e-6  # step of SLSQP, of a range: its line search fails where a limit trades for the objective
 ITERATIONS = 200
 FTOL = 1e-9  # of the objective, and of excesses
 GTOL, XTOL = 1e-7, 1e-9  # of trust-constr
@@ -37,11 +37,11 @@ class ReachedError(Exception):
 
 
 class StuckError(Exception):
-    """There is no gradient where the search is."""
+    """Signals that no gradient exists at the current design, or the design fails."""
 
 
 class StalledError(Exception):
-    """Steps are none, or limits are exceeded and have not come much nearer in the last ones."""
+    """Signals that steps vanish, or that the last ones hardly reduced the excess of limits."""
 
 
 def rank(evaluations: Evaluations, one: Evaluated) -> tuple[int, float]:
@@ -54,10 +54,10 @@ def rank(evaluations: Evaluations, one: Evaluated) -> tuple[int, float]:
 
 
 class _Functions:
-    """The functions that optimizers call, of the unit cube's coordinates x (n,) that are no catalog's; all scaled.
+    """Scaled functions for optimizers, of the coordinates x (n,) of numbers in the unit cube.
 
-    Rows whose largest is to be least are those of the objective, or with `excess` those of the limits. Where there are
-    several, x has one coordinate more, the level s: to be least, with rows − s ≤ 0. Excesses (m,) ≤ 0 are feasible.
+    They minimize the objective, or with `excess` the largest excess of a limit. Of several, x has one coordinate more,
+    the level s to be minimized, with excesses − s ≤ 0. Excesses (m,) ≤ 0 are feasible.
     """
 
     def __init__(
@@ -157,9 +157,9 @@ BEYOND = "no smaller excess was found near this one: --starts searches from othe
 
 @dataclass(frozen=True)
 class Local:
-    """One local search: its start, best design and that one's status, and the reason if it ended early.
+    """One local search: first and best design, conditions of optimality at the best, and a message if it ended early.
 
-    `spent`: whether it wanted more runs than there were.
+    `spent`: whether it ended because no more runs were allowed.
     """
 
     start: Evaluated
@@ -177,7 +177,7 @@ class Local:
 def search_from(
     start: Place, method: str, differentiation: Differentiation, watcher: Watcher, title: str = ""
 ) -> Local:
-    """Search along gradients from one start, first without error estimates of gradients, then with them.
+    """Search along gradients from one start by `method` ("slsqp", "trust-constr"), at last with their error estimates.
 
     SLSQP may stop early where a limit trades for the objective almost linearly; trust-constr then continues. After a
     design beyond limits, the search reduces the largest excess; it ends if that fails with error estimates.
@@ -224,7 +224,7 @@ def _pass(
     judged: bool,
     excess: bool = False,
 ) -> tuple[Evaluated, str]:
-    """The best design that an optimizer comes to from `best`, and why it ended where that is not at an optimum.
+    """The best design of an optimizer from `best` on, and why it ended where that is not at an optimum.
 
     "slsqp" is sequential quadratic programming (Kraft 1988), "trust-constr" a trust region with an interior point
     (Byrd, Hribar & Nocedal 1999).
@@ -264,7 +264,10 @@ def combinations(space: DesignSpace) -> int:
 
 
 def evolve(evaluations: Evaluations, seed: int, start: Place | None, tell: Callable[[str], None]) -> str:
-    """Search by differential evolution, a generation in parallel. Returns why it ended early, or an empty text."""
+    """Search by differential evolution, a generation in parallel; return the reason if it ended early, else "".
+
+    `tell`: function for messages on progress.
+    """
     space, problem = evaluations.space, evaluations.problem
     count = len(space.variables)
 

@@ -1,12 +1,12 @@
-"""The best design of a scene: `ffrobot optimise`. Every design is a run that is kept, as those of sensitivities are.
+"""The best design of a scene: `ffrobot optimise`. Every design is a run that is kept.
 
-Numbers are sought by SLSQP or trust-constr with gradients, from the scene's own values and further starts of a Latin
-hypercube; catalogs, and responses that are rough, by differential evolution or by trying every row. What is found last
-is judged by central differences: multipliers of limits and bounds, and how far the gradient is from theirs.
+Numbers are varied by SLSQP or trust-constr with gradients, from the scene's own values and further starts of a Latin
+hypercube; catalogs, and rough responses, by differential evolution or enumeration. Gradients with error estimates
+judge the best design by conditions of optimality.
 
-The Pareto front of two responses, the least of one for each value of the other, is found by the ε-constraint method
-(Haimes, Lasdon & Wismer 1971). Its ends are the best designs for each response alone. Between them the second response
-is limited, in equal ratios where both ends have one sign. Each search begins at its neighbor's design.
+The Pareto front of two responses is found by the ε-constraint method (Haimes, Lasdon & Wismer 1971). Its ends are the
+best designs for each response alone. Between them the second response is limited, in equal ratios if both ends have
+one sign. Each search begins at its neighbor's design.
 """
 
 from collections.abc import Iterator, Sequence
@@ -49,7 +49,7 @@ def find_optimum(
     runs: int,
     tolerance: float,
 ) -> Optimum:
-    """Optimize a scene: see `ffrobot.optimise`."""
+    """Optimize a scene; arguments as of `ffrobot.optimise`."""
     path, problem = runner.path, read_problem(minimise, maximise, subject_to)
     space, table = read_space(path, vary), runner.folder / "designs.csv"
     problem = with_motors(problem, space)
@@ -106,7 +106,7 @@ def _method(space: DesignSpace, method: str, most: int) -> str:
 
 
 def check_start(path: Path, space: DesignSpace, method: str) -> None:
-    """Raise `InputError` where a search along gradients could not begin at the scene itself."""
+    """Raise `InputError` if a search along gradients cannot begin at the scene's own values."""
     for variable, start in zip(space.variables, space.start(), strict=True):
         if start is None and method in ("slsqp", "trust-constr"):
             values = [value for key, value in zip(space.keys, space.own, strict=True) if key in variable.keys]
@@ -159,13 +159,13 @@ def _search(
 
 @dataclass(frozen=True, kw_only=True)
 class FrontPoint(Local):
-    """The best design with one limit of the second response.
+    """A point of a Pareto front: the best design for one limit of the second response.
 
     Attributes:
         point: values of the keys.
-        response, against: of both responses there, in the `units` of the front.
+        response, against: values of the first and second response, in `units` of the front.
         price: ∂response/∂against along the front; NaN at its ends.
-        feasible: whether it keeps all limits.
+        feasible: whether the design satisfies all limits.
     """
 
     point: tuple[object, ...]
@@ -179,7 +179,7 @@ class FrontPoint(Local):
 class Front(Searched):
     """A Pareto front: `points` from the least `responses[0]` to the least `responses[1]`.
 
-    Designs have the responses of `problem`, its limits along the whole curve included, and then the second response.
+    Designs have the responses of `problem`, then the second response.
     """
 
     name = "front"
@@ -191,7 +191,7 @@ class Front(Searched):
 
     @property
     def values(self) -> Array:
-        """Values (N, 2) of both responses, SI units."""
+        """Values (N, 2) of both responses at N points, SI units."""
         return np.array([(one.response, one.against) for one in self.points])
 
     @property

@@ -1,4 +1,4 @@
-"""The best design as it was found: values, limits that are reached with their prices, files, the text of it."""
+"""Result of an optimization: values, limits with their shadow prices, files, texts."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -34,9 +34,10 @@ def parallel(
     best_label: str,
     *more: str,
 ) -> Parallel:
-    """Return a line for each design over the variables of `space`, the responses of `problem` with limits, and `more`.
+    """Return parallel coordinates of `designs`: variables of `space`, responses and limits of `problem`.
 
-    Readings of designs are in this order; `best` are the designs that `best_label` names.
+    `more`: names of further responses, in the order of the designs' readings. `best` are designs that `best_label`
+    names in the legend.
     """
     chosen = {one.design.folder for one in best}
 
@@ -64,7 +65,7 @@ def parallel(
 
 
 def progress(problem: DesignProblem, designs: Sequence[Evaluated], lines: Parallel) -> Progress:
-    """The objective of each design in the order of the search, as `lines` have it."""
+    """Return a diagram of the objective, design by design; `lines`: the `parallel` diagram of these designs."""
     axis = lines.axes[-len(problem.responses)]
     kept = [
         problem.sense * one.values[0] if one.completed and problem.keeps(one.readings) else np.inf for one in designs
@@ -98,10 +99,11 @@ COLUMNS = ("what", "name", "start", "best", "low", "high", "reached", "price")
 
 @dataclass(frozen=True, kw_only=True)
 class Searched(Finding):
-    """Base of what searches find.
+    """Base of the results of searches.
 
     Attributes:
-        problem, space: the objective with its limits, and the parameters.
+        problem: objective and limits.
+        space: varied parameters.
         tolerance: largest tolerance of the runs.
         tried: all designs, each once, in the order of the search.
     """
@@ -123,9 +125,9 @@ class Optimum(Searched, Local):
 
     Attributes:
         method: the optimizer.
-        verdict: of the best design.
-        best_scene: its scene file, complete; None if it was not kept.
-        designs: the table of all designs with their responses; None likewise.
+        verdict: answers of all analyses of the best design.
+        best_scene: complete scene file of the best design; None if it was not kept.
+        designs: CSV table of all designs with their responses; None if it was not kept.
     """
 
     name = "optimum"
@@ -149,7 +151,7 @@ class Optimum(Searched, Local):
 
     @property
     def limits(self) -> Array:
-        """Values (m,) of the limited responses, SI units."""
+        """Values (m,) of the m responses with limits, in the best design, SI units."""
         return np.array([reading.value for reading in self.best.readings[1:]])
 
     @property
@@ -164,7 +166,7 @@ class Optimum(Searched, Local):
 
     @property
     def prices(self) -> Array:
-        """Shadow prices (m,) ∂response/∂limit, SI units; NaN for inactive limits."""
+        """Shadow prices (m,) ∂response/∂limit of m limits, SI units; NaN for inactive ones."""
         if self.optimality is None:
             return np.full(len(self.problem.limits), np.nan)
         room = np.array([limit.sense / limit.scale for limit in self.problem.limits])
@@ -172,7 +174,7 @@ class Optimum(Searched, Local):
 
     @property
     def bound_prices(self) -> Array:
-        """Shadow prices (n,) ∂response/∂bound, SI units; NaN for inactive bounds."""
+        """Shadow prices (n,) ∂response/∂bound of n parameters, SI units; NaN between bounds."""
         if self.optimality is None:
             return np.full(len(self.space.variables), np.nan)
         prices = -self.optimality.bounds / self.problem.factors(self.best.values)[0]

@@ -1,8 +1,7 @@
-"""What a response is: a scalar by results, which is followed to those of a changed scene.
+"""Responses, scalars read from results, and their values in results of a changed scene.
 
-A peak belongs to a time and a column: its derivative by a parameter is that of the history there (envelope theorem,
-Danskin 1966), as long as no other time overtakes it. The time is that of the top itself, where d/dt = 0, which lies
-between outputs.
+The derivative of a peak by a parameter is that of the history at its time and column (envelope theorem, Danskin 1966),
+as long as no other peak exceeds it. The time is that of the top itself, between outputs.
 """
 
 import re
@@ -23,18 +22,18 @@ from ..sweep.runs import by_dots, is_vector
 
 @dataclass(frozen=True)
 class Reading:
-    """A response's value by results. Of a peak also where it is.
+    """Value of a response in some results; of a peak also its time and column.
 
     Attributes:
-        value: of the response, in `unit`, which is empty where it is not known.
-        time: of a peak, s; NaN of all else.
-        edge: "first" or "last" where that is an end of the run, which may move.
-        column, sign: of its history, and of the value there.
-        mode: of a frequency, the family and its number in it.
-        coarse: of a peak, its value by every second output; NaN of all else.
-        missed_by: of a peak or mean that outputs miss, its value by outputs alone; NaN of all else.
-        doubt: why the value is uncertain; empty where it is not.
-        elsewhere: of a peak followed at its own place, where the largest value is now; empty where it is there.
+        value: value in `unit`, which is empty if it is unknown.
+        time: time of a peak, s; NaN for other responses.
+        edge: "first" or "last" if the peak is at an end of the run, which may move.
+        column, sign: column of the history with the peak, and sign of the value there.
+        mode: family of a frequency's mode, and number in the family.
+        coarse: value of a peak by every second output; NaN for other responses.
+        missed_by: value by outputs alone of a peak or mean that lies between outputs; NaN otherwise.
+        doubt: reason why the value is uncertain, or empty.
+        elsewhere: text on the largest value, if it is another peak than the followed one; otherwise empty.
     """
 
     value: float
@@ -55,7 +54,7 @@ class Reading:
 
     @property
     def is_between(self) -> bool:
-        """Whether outputs miss the value: it has no time and column, and is compared as it is between runs."""
+        """Whether outputs miss the value: then it has no time and column, and runs are compared by the value alone."""
         return bool(np.isfinite(self.missed_by))
 
     @property
@@ -68,12 +67,12 @@ class Reading:
 
 
 class Response:
-    """One scalar result to optimize or limit; `text` is the user's name for it.
+    """One scalar result to differentiate, optimize or limit; `text` is the user's name for it.
 
     Attributes:
-        name: of its history, if it has one.
-        needs_motion: whether an analysis has to be run for it.
-        is_of_rest: whether that is by default the first which follows paths, rather than the first of all.
+        name: name of its history, if it has one.
+        needs_motion: whether it depends on histories of an analysis.
+        is_of_rest: whether its default analysis is the first one over time, rather than the first of all.
     """
 
     text: str
@@ -83,7 +82,7 @@ class Response:
 
     @property
     def analysis(self) -> str:
-        """First part of the name of the history, which may be an analysis."""
+        """First part of the history's name, which may be an analysis."""
         return self.name.replace("/", ".").partition(".")[0]
 
     def read(self, results: Results) -> Reading:
@@ -97,20 +96,20 @@ class Response:
 
 JOINT = re.compile(r"[^/]+/joints/[^/]+")
 POWER = "power"
-"""What joints have besides their datasets: the power of their motors, W."""
+"""History of joints in addition to their datasets: power of their motors, W."""
 
 SAME = 1e-6  # of an output step: times that are one
-MISSED = 1e-3  # of a peak, or of the RMS of a mean: how much values between outputs change it where they count
+MISSED = 1e-3  # of a peak, or of a mean's RMS: change by values between outputs from which they count
 UNCERTAIN = "uncertain, as outputs, which alone count here, miss a part of the history: take a smaller output_step"
 SUPPORT = 6  # outputs that a value between outputs is made from
 
 
 @dataclass(frozen=True)
 class History:
-    """A dataset over time: `values` (T, columns) at `time` (T,), s; the length of a vector as one column.
+    """A dataset over T outputs: `values` (T, columns) in `unit` at `time` (T,), s; of vectors the length, one column.
 
-    `largest`, `rms`, `mean`: of all columns and of all times that the run looked at; NaN where that is not known.
-    `is_in_doubt`: whether that is so of a part of a vector whose length outputs miss.
+    `largest`, `rms`, `mean`: over all columns and all time steps, also between outputs; NaN if unknown.
+    `is_in_doubt`: whether they are unknown for a component of a vector whose length outputs miss.
     """
 
     name: str
@@ -125,7 +124,7 @@ class History:
     def at(self, t: float, column: int, every: int = 1) -> float:
         """Value at t (s), in `unit`: that of an output, or of the polynomial through the six nearest (Lagrange).
 
-        With `every` = 2 every second of those about t alone is known, without the one next to it.
+        `every` = 2 uses every second output alone, without the one nearest to t.
         """
         values, time = self.values[:, column], self.time
         if every > 1 and time.size > every * SUPPORT:
@@ -142,9 +141,9 @@ class History:
 
 
 def read_history(results: Results, name: str, option: str) -> History:
-    """The history that `name` means; without an analysis in front it is of the first one that the results have.
+    """Return the history `name`; without an analysis in front, that of the first analysis that has it.
 
-    Raises `InputError`, with the `option` that names it, where there is none.
+    Raises `InputError`, which begins with `option`, where there is none.
     """
     wanted, k = dataset_and_column(name)
     datasets = _known(results)
@@ -179,7 +178,7 @@ def read_history(results: Results, name: str, option: str) -> History:
 
 
 def read_column(results: Results, name: str, option: str) -> History:
-    """The history `name` as in `read_history`. Raises `InputError` also where it has several columns."""
+    """Return the history `name` as `read_history`. Raises `InputError` also where it has several columns."""
     history = read_history(results, name, option)
     if (count := history.values.shape[1]) > 1:
         raise InputError(f'{option}: expected one column, such as "{name}[0]"', f'{count} of "{name}"')
@@ -206,7 +205,7 @@ def _power(results: Results, name: str) -> Array:
     return power.sum(axis=1, keepdims=True)
 
 
-COARSE = 2  # every second output: what a peak is with these tells how well all of them resolve it
+COARSE = 2  # every second output: peaks by these show how well all resolve them
 NOISE = 1e-6  # of a peak: a valley that is less deep lies between no two peaks
 
 
@@ -218,7 +217,7 @@ class Peak(Response):
     name: str
 
     def read(self, results: Results) -> Reading:
-        """The value, when it is reached, and in which column."""
+        """Return the value of the peak, its time, and its column."""
         history = read_history(results, self.name, f'"{self.text}"')
         k, column = _largest(history.values)
         sign = -1.0 if history.values[k, column] < 0.0 else 1.0
@@ -231,7 +230,7 @@ class Peak(Response):
         return Reading(value, history.unit, time, edge, column, sign, coarse=coarse, doubt=doubt)
 
     def follow(self, results: Results, nominal: Reading) -> Reading:
-        """Return the value at time, column and sign of the `nominal` peak; of one between outputs the largest value."""
+        """Return the value at time, column and sign of the `nominal` peak; the largest value if outputs miss that."""
         history = read_history(results, self.name, f'"{self.text}"')
         if nominal.is_between:
             return Reading(float(np.fmax(history.largest, np.abs(history.values).max())))

@@ -1,4 +1,4 @@
-"""Scalars that a design is judged by, with limits: what `--of`, `--minimise` and `--subject-to` may say."""
+"""Responses and limits of designs, as options `--of`, `--minimise` and `--subject-to` name them."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -23,9 +23,9 @@ from .variables import DesignSpace, DesignVariable
 
 @dataclass(frozen=True)
 class OfMotors(Response):
-    """Response of chosen motors: total "mass" (kg) or "cost", or the largest "share" of a limit.
+    """Response of motors that the variables `chosen` select: total "mass" (kg) or "cost", or the largest "share".
 
-    The share is that of rated torque (by the RMS), of peak torque, or of speed.
+    The share is that of rated torque (by the RMS), of peak torque, or of speed; 1 at the limit.
     """
 
     what: str
@@ -69,7 +69,7 @@ class OfHistory(Response):
     t: float = np.nan
 
     def read(self, results: Results) -> Reading:
-        """Return the response in the unit of the history, of integrals times s."""
+        """Return the response in the unit of the history; that of integrals is multiplied by s."""
         history = read_column(results, self.name, f'"{self.text}"')
         unit = f"{history.unit}·s" if history.unit and self.word == "integral" else history.unit
         unit = {"W·s": "J"}.get(unit, unit)
@@ -111,7 +111,7 @@ class OfSettling(Response):
         return self.point.rpartition("/")[0]
 
     def read(self, results: Results) -> Reading:
-        """The number; of a point that does not settle the time that the run leaves it."""
+        """Return residual (m) or time (s); if the point does not settle, the time from the path's to the run's end."""
         analysis, about = results.settling(self.point, f'"{self.text}"')
         if self.what == "residual":
             return Reading(float(about["residual"]), "m")
@@ -200,7 +200,7 @@ FORMS: dict[str, Callable[..., Response]] = {
     **{f"motors {what}": partial(OfMotors, what) for what in ("mass", "cost", "share")},
     "value KEY": OfValue,
 }
-"""What makes responses of their text and its words in place of capitals."""
+"""Functions that make responses of their text and its words in capitals here."""
 
 
 def parse_response(text: str, option: str = "--of") -> Response:
@@ -222,7 +222,7 @@ def _modes(body: ModalBody) -> list[str]:
 
 LIMIT = re.compile(r"(?P<response>.*\S)\s*(?P<sense><=|>=)\s*(?P<bound>\S+)\s*")
 
-LINEAR = 0.1  # ratios of responses to their size: logarithms above, their tangent below, for responses may be negative
+LINEAR = 0.1  # ratio to a response's size: logarithms above, tangent below, as responses may be negative
 KEPT = 1e-6  # of a limit: what is beyond it by no more keeps it
 
 
@@ -241,17 +241,20 @@ class Limit:
 
     @property
     def scale(self) -> float:
-        """The scale of its excess: the bound; of 0 the response's unit."""
+        """Scale of the excess: |bound|, or 1 SI unit if the bound is 0."""
         return abs(self.bound) or 1.0
 
     def excess(self, value: float) -> float:
-        """How far a value is beyond the limit, relative to `scale`; negative within it."""
+        """Return the excess of a value over the limit, relative to `scale`; negative within it."""
         return self.sense * (value - self.bound) / self.scale
 
 
 @dataclass(frozen=True)
 class DesignProblem:
-    """Optimization problem: minimize (`sense` 1) or maximize (−1) the objective within `limits`; `scale`: its size."""
+    """Optimization problem: minimize (`sense` 1) or maximize (−1) the objective within m `limits`.
+
+    `scale`: value of the objective in the first design.
+    """
 
     objective: Response
     sense: float
@@ -264,9 +267,9 @@ class DesignProblem:
         return (self.objective, *(limit.response for limit in self.limits))
 
     def scaled(self, values: Sequence[float]) -> Array:
-        """Return (1 + m,) scaled objective F, to be minimized, and constraints g ≤ 0: logarithms of value over scale.
+        """Return (1 + m,) scaled objective F, to be minimized, and constraints g ≤ 0, no unit, of values in SI units.
 
-        Powers of lengths, as masses and deflections are, become linear in the logarithms of these.
+        They are logarithms of value over scale: powers of lengths, as masses and deflections are, become linear.
         """
         return self._scaled(values)[0]
 
@@ -285,7 +288,7 @@ class DesignProblem:
         return senses * (np.log(place) + (ratios - place) / place), senses / place / sizes
 
     def keeps(self, readings: Sequence[Reading]) -> bool:
-        """Return whether all limits are kept; more readings than those of the problem may follow."""
+        """Whether all limits are satisfied; `readings`: objective, limits, and possibly more."""
         return self.violation(readings) <= KEPT
 
     def violation(self, readings: Sequence[Reading]) -> float:
@@ -295,7 +298,7 @@ class DesignProblem:
 
 
 def read_problem(minimise: str | None, maximise: str | None, subject_to: Sequence[str]) -> DesignProblem:
-    """Return the problem of the command line's objective and limits. Raises `InputError` without one objective."""
+    """Return the problem of an objective and limits as text. Raises `InputError` unless there is one objective."""
     if (minimise is None) == (maximise is None):
         objectives = "both" if minimise is not None else "none"
         raise InputError("optimise: expected one objective, --minimise RESPONSE or --maximise RESPONSE", objectives)

@@ -1,14 +1,12 @@
 """Derivatives of responses by numbers of a scene and its links: `ffrobot sensitivity`.
 
-Where integrations can be repeated, runs beside the scene's own take its steps again (`mbs/fields/field_types.py`). The
-noise of their differences is round-off, 1e-13 to 1e-11 of a response after thousands of steps and with new modes of
-links. Truncation grows with the number of periods that vibrations pass through. So the
-steps of every key are small, three of two sizes (`THREE`), which check each other. Others follow where derivatives err
-by more than `derivatives.AIM`.
+If possible, runs reuse the time steps of the scene's own run (`mbs/fields/field_types.py`). The noise of differences is
+then round-off, 1e-13 to 1e-11 of a response after thousands of steps and with new modes of links. Truncation grows with
+the number of periods of vibrations. So every key takes three small steps of two sizes (`THREE`), which check each
+other, and others where errors are above `derivatives.AIM`.
 
-Otherwise every key takes steps of three sizes to both sides, h, h/2 and h/4 with h one percent, in runs that are
-integrated with a tighter tolerance than the scene's. Where errors are above `AIM` and still fall with smaller steps,
-steps of a quarter follow, twice at most.
+Otherwise every key takes steps h, h/2 and h/4 to both sides, with h one percent, in runs with a tighter tolerance than
+the scene's. If errors above `AIM` fall with smaller steps, steps of a quarter follow, twice at most.
 """
 
 from collections.abc import Iterator, Sequence
@@ -44,9 +42,9 @@ class Sensitivity(Finding):
     """Derivatives of g responses with respect to k keys.
 
     Attributes:
-        readings: of the responses in the scene.
-        keys: with dots; `values` (k,) are theirs in the scene.
-        entries: the derivatives, [response][key].
+        readings: values of the responses in the scene, by name.
+        keys: names with dots; `values` (k,) are theirs in the scene, SI units.
+        entries: derivatives, [response][key].
         tolerance: largest tolerance of the runs.
     """
 
@@ -82,7 +80,7 @@ class Sensitivity(Finding):
             return np.where(self.value[:, None] == 0.0, np.nan, self.derivative * ratios)
 
     def ranked(self, g: int) -> list[int]:
-        """Key numbers by decreasing influence on response g, in percent per percent, or else by derivative."""
+        """Return numbers of keys by decreasing influence on response g, in percent per percent, else by derivative."""
         sizes = [np.nan_to_num(np.abs(of[g])) for of in (self.logarithmic, self.derivative)]
         return sorted(range(len(self.keys)), key=lambda k: (-sizes[0][k], -sizes[1][k]))
 
@@ -115,10 +113,7 @@ class Sensitivity(Finding):
         yield CsvFile("sensitivity.csv", COLUMNS, rows)
 
     def diagrams(self) -> list[Bars]:
-        """Tornado diagrams, one for each response: percent per percent of each key, the largest on top.
-
-        Keys without a number are left out.
-        """
+        """Tornado diagrams, one for each response: percent per percent of keys with a derivative, largest on top."""
         bars = []
         for g, (response, reading) in enumerate(self.readings.items()):
             known = [k for k in self.ranked(g) if np.isfinite(self.logarithmic[g, k])]
@@ -154,14 +149,14 @@ THREE = (-1e-3, 1e-3, 2e-3)  # of the largest step: where runs take the same ste
 OTHERS = ((1e-4, -1e-4, 4e-3, -4e-3), (1e-2, -1e-2))  # likewise, that follow where these are not good enough
 BOTH_SIDES = (1.0, -1.0, 0.5, -0.5, 0.25, -0.25)  # likewise, where runs choose their own
 FINER = ((0.125, -0.125, 0.0625, -0.0625), (0.03125, -0.03125, 0.015625, -0.015625))  # where these are too large
-TOLERANCE = 1e-9  # of the runs: below, round-off in forces of stiff links is not far
-TOLERANCE_REPEATED = 1e-7  # of those that take the same steps: their noise is none of its
+TOLERANCE = 1e-9  # of the runs, near round-off of forces in stiff links
+TOLERANCE_REPEATED = 1e-7  # of runs with reused steps, whose noise does not depend on it
 
 
 def find_sensitivity(
     runs: Runs, of: Sequence[str], to: Sequence[str], step: float, tolerance: float | None
 ) -> Sensitivity:
-    """Compute derivatives of responses: see `ffrobot.sensitivity`."""
+    """Compute derivatives of responses; arguments as of `ffrobot.sensitivity`."""
     responses = tuple(parse_response(text) for text in dict.fromkeys(of))
     keys = tuple(parse_key(text, "--to") for text in dict.fromkeys(to))
     if not responses or not keys:
@@ -195,10 +190,10 @@ def find_sensitivity(
 def _start(
     runs: Runs, responses: tuple[Response, ...], keys: tuple[Key, ...], step: float, tolerance: float | None
 ) -> tuple[Designs, Base]:
-    """The place where derivatives are taken, with the responses of the scene's own design, and designs beside it.
+    """The base of derivatives at the scene's own values, and designs with other values.
 
-    These take its steps again where they can; else runs have a tighter tolerance. Raises `InputError` for a key that
-    may be neither larger nor smaller, such as a count.
+    These reuse its time steps if they can; else runs have a tighter tolerance. Raises `InputError` for a key that may
+    be neither larger nor smaller, such as a count.
     """
     point = tuple(number_at(runs.path, key, "--to") for key in keys)
     steps = tuple(step * (abs(value) or 1.0) for value in point)  # of keys that are 0, in their unit

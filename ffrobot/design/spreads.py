@@ -1,9 +1,7 @@
-"""How keys are spread (`KEY=±2%`, `KEY=normal:SIGMA`, …), and statistics of what is linear in them.
+"""Distributions of keys (`KEY=±2%`, `KEY=normal:SIGMA`, …), and statistics of linear functions of them.
 
-Mean, standard deviation and quantiles of samples with their own errors, and what shares of a variance keys have.
-
-Errors are those of independent samples. The mean of a Latin hypercube, whose samples are spread evenly over every key,
-is better the nearer its quantity is to a sum of functions of one key each (Stein, Technometrics 29, 1987).
+Mean, standard deviation and quantiles of samples have errors of independent samples. The mean of a Latin hypercube is
+better the nearer its quantity is to a sum of functions of one key each (Stein, Technometrics 29, 1987).
 """
 
 import math
@@ -31,10 +29,10 @@ RESAMPLES = 200  # of a bootstrap
 
 @dataclass(frozen=True)
 class SpreadStatistics:
-    """Statistics of quantities (…): `mean` (…), `deviation` (…), `quantiles` (3, …) at `LEVELS`.
+    """Statistics of quantities (…) in their units: `mean` (…), `deviation` (…), `quantiles` (3, …) at `LEVELS`.
 
-    Beside each its standard error: `mean_error`, `deviation_error`, `quantile_errors`. `lowest` and `highest` (…) are
-    the worst case: of samples the least and the largest one.
+    Standard errors of these have the same shapes. `lowest` and `highest` (…) are the worst cases: the least and the
+    largest sample.
     """
 
     mean: Array
@@ -64,7 +62,7 @@ class SpreadStatistics:
 
 
 def statistics(values: Array) -> SpreadStatistics:
-    """Return statistics of samples (n, …), n > 1, in their unit.
+    """Return statistics of n > 1 samples `values` (n, …), in their unit.
 
     The error of s is √((m₄ − s⁴ (n − 3)/(n − 1))/n)/2s with the fourth central moment m₄; that of a quantile half the
     distance between the order statistics one standard deviation of the binomial distribution below and above it.
@@ -89,9 +87,10 @@ def statistics(values: Array) -> SpreadStatistics:
 
 
 def regression_shares(inputs: Array, outputs: Array) -> tuple[Array, Array]:
-    """Return squared standardized regression coefficients (g, k) and R² (g,) of outputs (n, g) by inputs (n, k).
+    """Return squared standardized regression coefficients (g, k) and R² (g,), no unit.
 
-    Both are dimensionless. Near R² = 1 coefficients are shares of the variance; else the responses are not linear.
+    `outputs` (n, g) and `inputs` (n, k), any unit: n samples of g responses and k keys. Near R² = 1 coefficients are
+    shares of the variance; else the responses are not linear.
     """
     x = (inputs - inputs.mean(axis=0)) / inputs.std(axis=0)
     size = outputs.std(axis=0)
@@ -104,7 +103,10 @@ def regression_shares(inputs: Array, outputs: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Indices:
-    """Sobol indices (g, k) with bootstrap errors: `first` order (a key alone) and `total` (with interactions)."""
+    """Sobol indices (g, k), no unit, of g responses by k keys: `first` order (a key alone), `total` (interactions too).
+
+    Errors (g, k) are those of the bootstrap.
+    """
 
     first: Array
     first_error: Array
@@ -113,12 +115,12 @@ class Indices:
 
     @property
     def named(self) -> dict[str, tuple[Array, Array]]:
-        """Indices and their errors by what keys do alone, and with others."""
+        """Indices (g, k) with errors (g, k), no unit, as "alone" (first order) and "with others" (total)."""
         return {"alone": (self.first, self.first_error), "with others": (self.total, self.total_error)}
 
 
 def sobol_indices(a: Array, b: Array, ab: Array, seed: int = 0) -> Indices:
-    """Return Sobol indices from responses at points A (n, g), B (n, g), and A with column i of B (k, n, g).
+    """Return Sobol indices from g responses, any unit, at points A (n, g), B (n, g), A with column i of B (k, n, g).
 
     First order after Saltelli et al. (Computer Physics Communications 181, 2010, table 2b), total after Jansen
     (Computer Physics Communications 117, 1999).
@@ -142,7 +144,7 @@ def _indices(a: Array, b: Array, ab: Array) -> tuple[Array, Array]:
     return first.T, total.T
 
 
-WIDE = 2.0  # standard deviations of a normal key within which scenes have to make sense
+WIDE = 2.0  # standard deviations of a normal key within which scenes have to be valid
 
 
 @dataclass(frozen=True)
@@ -166,7 +168,7 @@ class Spread:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Bounds at which the scene has to be valid."""
+        """Values of the key, in its unit, between which scenes have to be valid: two deviations of a normal one."""
         far = self.half if self.kind == "uniform" else WIDE * self.deviation
         return self.mean - far, self.mean + far
 
@@ -219,11 +221,11 @@ DRAWS = 4096  # of the model, for quantiles: no runs
 
 
 def linear_statistics(spreads: Sequence[Spread], middle: Array, sides: Array) -> tuple[SpreadStatistics, Array]:
-    """Return statistics of f = f₀ + Σ d_k δ_k with δ_k in standard deviations of key k, and shares (…, k) of the keys.
+    """Return statistics of responses f = f₀ + Σ d_k δ_k, and shares (…, k), no unit, of the variance by k keys.
 
-    By values `middle` (…) and `sides` (k, 2, …), one standard deviation above and below it. Errors are what curvatures,
-    ½ Σ c_k δ_k², would change. The worst case has every key at the end of its spread that makes it worst, a normal one
-    two deviations off. Shares are those of the variance.
+    δ_k is in standard deviations of key k. `middle` (…): responses, any unit, at the means; `sides` (k, 2, …): one
+    deviation of each key above and below. Errors are changes by curvatures, ½ Σ c_k δ_k². Worst cases have every key
+    at an end of its spread, a normal one two deviations off.
     """
     above, below = sides[:, 0], sides[:, 1]
     slopes, curvatures = 0.5 * (above - below), above - 2.0 * middle + below

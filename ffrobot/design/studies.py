@@ -1,4 +1,4 @@
-"""The design commands for use from Python. Their signatures, ranges and texts are those of the command line, too.
+"""Functions of the design commands. Their signatures, ranges and texts are those of the command line, too.
 
 `commands.options.options_of` reads annotations, which are evaluated here; an entry of Args begins with the help.
 """
@@ -55,7 +55,7 @@ class RunOptions(TypedDict, total=False):
 
 
 def _checked(function: Callable[P, R]) -> Callable[P, R]:
-    """Raise `InputError` for what a signature does not have: numbers out of ranges, other choices, text for lists."""
+    """Raise `InputError` for numbers out of ranges, unknown choices, and text instead of lists."""
     signature = inspect.signature(function)
     annotations = {name: parameter.annotation for name, parameter in signature.parameters.items()}
     annotations["processes"] = RunOptions.__annotations__["processes"]
@@ -219,7 +219,7 @@ def trade_off(
         points: number of designs on that front.
         subject_to: limits, as in `optimise`.
         runs: largest number of runs of all searches together.
-        tolerance: of the runs, if the scene has a larger one.
+        tolerance: tolerance of the runs, if the scene has a larger one.
         how: as in `sensitivity`.
 
     Returns:

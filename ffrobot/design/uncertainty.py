@@ -1,8 +1,8 @@
-"""How sure results are where keys are spread: `ffrobot uncertainty`, by samples or by gradients.
+"""Uncertainty of results under distributions of keys: `ffrobot uncertainty`, by samples or by gradients.
 
-Samples are a Latin hypercube of the keys' distributions. With `indices` they are two of half the size, A and B, and for
-every key A with that column from B: Sobol indices need no other runs. Gradients take two runs for each key, one
-standard deviation to both sides; what these say of curvature is the estimate of the error.
+Samples are a Latin hypercube of the keys' distributions. With `indices` they are two of half the size, A and B, and A
+with the column of each key from B. Gradients take two runs for each key, one standard deviation to both sides, whose
+curvature is the estimated error.
 """
 
 from collections.abc import Callable, Sequence
@@ -35,7 +35,7 @@ FEWEST = 8  # samples for a quantile of 5 %
 def find_uncertainty(
     runs: Runs, of: Sequence[str], spread: Sequence[str], samples: int, seed: int, by: LinearOrSampled, *, indices: bool
 ) -> Uncertainty:
-    """Propagate distributions of keys: see `ffrobot.uncertainty`."""
+    """Propagate distributions of keys; arguments as of `ffrobot.uncertainty`."""
     if by == "samples" and samples < FEWEST:
         raise InputError(f"uncertainty: expected at least {FEWEST} samples", samples)
     if by == "gradients" and indices:
@@ -52,9 +52,9 @@ def find_uncertainty(
 
 
 class _Study:
-    """Designs by the values of keys that are spread, and what responses and histories are with nominal values.
+    """Designs by the values of uncertain keys, and nominal responses and histories.
 
-    Making it raises `InputError` for spreads that make scenes impossible, `SolveError` where the nominal scene fails.
+    Raises `InputError` for spreads that make scenes impossible, `SolveError` where the nominal scene fails.
     """
 
     def __init__(

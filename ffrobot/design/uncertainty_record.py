@@ -1,4 +1,4 @@
-"""What `ffrobot uncertainty` has found, as texts, tables and diagrams."""
+"""Result of `ffrobot uncertainty` as texts, tables and diagrams."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ WORST = {"samples": "lowest and highest sample", "gradients": "keys at their wor
 
 @dataclass(frozen=True)
 class HistoryBand:
-    """A history's statistics at `time` (T,), s; `nominal` (T,) with all keys at the middle of their spreads."""
+    """Statistics (T,) of a history at `time` (T,), s; `nominal` (T,), in `unit`: all keys at their mean values."""
 
     name: str
     unit: str
@@ -38,12 +38,12 @@ class Uncertainty(Finding):
     Attributes:
         spreads: (k,) distributions of the keys.
         method: samples or gradients.
-        readings: of the responses with all keys at nominal values.
-        statistics: (g,) of the responses.
-        bands: of the histories.
-        shares: (g, k) shares of the variance by the linear part; `explained` (g,) is their sum, NaN by gradients.
+        readings: values of the responses with all keys at their mean values, by name.
+        statistics: (g,) of the responses, SI units.
+        bands: bands of the histories.
+        shares: (g, k) shares of the variance by the linear part, no unit; `explained` (g,): R², NaN by gradients.
         indices: Sobol indices, if requested.
-        samples: (n, g) the responses, NaN for failed runs; (0, g) by gradients.
+        samples: (n, g) the responses, SI units, NaN for failed runs; (0, g) by gradients.
         notes: peaks between outputs; peaks that others exceed near the nominal values (by gradients).
     """
 
@@ -110,7 +110,7 @@ class Uncertainty(Finding):
         return TextTable(("key", "spread", *parts), rows, of=[*self.readings][g])
 
     def ranked(self, g: int) -> list[int]:
-        """Key numbers by decreasing influence on response g."""
+        """Return numbers of keys by decreasing influence on response g."""
         by = self.indices.total[g] if self.indices else self.shares[g]
         return [int(k) for k in np.argsort(-np.nan_to_num(by), kind="stable")]
 

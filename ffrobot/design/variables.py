@@ -1,7 +1,7 @@
-"""What a search may change: numbers within bounds and rows of catalogs, and the unit cube that optimizers see.
+"""Variables of a search: numbers within bounds and rows of catalogs, and the unit cube of optimizers.
 
-A place u has a coordinate for each variable: of a number its way from the lower bound (0) to the upper one (1), of a
-catalog the number of the row, from 0.
+A place u has a coordinate for each variable: that of a number goes from the lower bound (0) to the upper one (1), that
+of a catalog is the number of the row, from 0.
 """
 
 import re
@@ -23,7 +23,7 @@ from ..sweep.sweep import Key, check_once
 from .designs import Point, parse_key
 
 Place = tuple[float, ...]
-"""A coordinate for each variable."""
+"""A coordinate for each variable, in the unit cube."""
 
 CATALOGUE = re.compile(r"(?P<keys>.*\S)\s+in\s*\{(?P<rows>.*)\}\s*", re.DOTALL)
 MOTOR = re.compile(r"motor\s+(?P<joint>[^,\s]+)\s*(,\s*(?P<mass>\S+))?\s+in\s+(?P<file>[^{].*)")
@@ -34,9 +34,9 @@ FORMS = (
 
 @dataclass(frozen=True)
 class DesignVariable:
-    """A number between `low` and `high` that all `keys` take, or one of the `rows` with a value for each key.
+    """A number x between `low` and `high` that all `keys` take, or one of the `rows` with a value for each key.
 
-    `motors`: of rows that are motors of the catalog with one of their gears, the motor of each.
+    A coordinate u is 0 to 1 between the bounds, or the number of a row. `motors`: motors of a catalog in the rows.
     """
 
     keys: tuple[Key, ...]
@@ -70,7 +70,7 @@ class DesignVariable:
         return (float(np.clip(value, a, b)),) * len(self.keys)  # round-off goes past no bound
 
     def coordinate(self, values: tuple[Any, ...]) -> float | None:
-        """Return u of given values; None if they are out of bounds, differ, or are no row of the catalog."""
+        """Return coordinate u of values of the keys; None if they are out of bounds, differ, or are no row."""
         if self.rows:
             return float(self.rows.index(values)) if values in self.rows else None
         x, (a, b) = values[0], (self.low, self.high)
@@ -79,7 +79,7 @@ class DesignVariable:
         return float(np.log(x / a) / np.log(b / a)) if self.logarithmic else (x - a) / (b - a)
 
     def slope(self, u: float) -> float:
-        """Return dx/du of the number x at coordinate u."""
+        """Return dx/du, in the unit of the number x, at coordinate u."""
         if self.logarithmic:
             return float(self.values(u)[0] * np.log(self.high / self.low))
         return self.high - self.low
@@ -107,21 +107,21 @@ class DesignSpace:
 
     @property
     def numbers(self) -> list[int]:
-        """Which variables are numbers between bounds."""
+        """Indices of the variables that are numbers between bounds."""
         return [j for j, variable in enumerate(self.variables) if not variable.is_catalogue]
 
     def point(self, place: Place) -> Point:
-        """Values of all keys at a point; exactly the scene's own where they equal them up to round-off."""
+        """Return the values of all keys at a place of the unit cube."""
         return tuple(value for v, u in zip(self.variables, place, strict=True) for value in v.values(u))
 
     def start(self) -> tuple[float | None, ...]:
-        """Coordinates of the scene itself; None where it is out of bounds or in no catalog."""
+        """Return the coordinates of the scene's own values; None where they are out of bounds or in no catalog."""
         own = iter(self.own)
         return tuple(variable.coordinate(tuple(islice(own, len(variable.keys)))) for variable in self.variables)
 
     @property
     def start_place(self) -> Place | None:
-        """Coordinates of the scene itself; None if one of `start` is."""
+        """Place of the scene's own values; None if one is out of bounds or in no catalog."""
         own = [u for u in self.start() if u is not None]
         return tuple(own) if len(own) == len(self.variables) else None
 
@@ -163,10 +163,9 @@ def parse_variable(text: str) -> DesignVariable:
 
 
 def _motors(joint: str, mass: str | None, catalog: Path) -> DesignVariable:
-    """The motors of a joint, each with each of its gears: inertia and limits as the scene has them, at the joint.
+    """Motors for a joint, each with each of its gears: inertia and limits, at the joint, as keys of the scene.
 
-    With losses in the gear, the limit is the torque that is left of the motor's peak where it drives. `mass` is a key
-    that takes the mass of the motor, such as that of a payload.
+    The torque limit is the motor's peak less losses of a driving gear. `mass`: key that takes the motor's mass.
     """
     keys = tuple(("joint", joint, key) for key in ("gear_ratio", "rotor_inertia", "moment_limit", "speed_limit"))
     rows: dict[tuple[Any, ...], CatalogMotor] = {}
