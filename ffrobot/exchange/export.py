@@ -1,4 +1,4 @@
-"""`ffrobot export`, and `ffrobot import` of bodies: which format takes which file, and how it is written."""
+"""`ffrobot export`, and `ffrobot import` of bodies and motions: formats of each kind of file, and writing."""
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
@@ -37,11 +37,11 @@ from .urdf.import_urdf import Imported
 from .urdf.shape_masses import MASSES
 
 Content = str | bytes | Mapping[str, bytes]
-"""Of a file, or the files of a folder by name."""
+"""Content of a file, or of the files of a folder by name."""
 
 
 class Exported(NamedTuple):
-    """The file written, a few words on its content, and remarks."""
+    """Result of an export: the written file, `what` it contains in words, and remarks on losses."""
 
     path: Path
     what: str
@@ -49,9 +49,9 @@ class Exported(NamedTuple):
 
 
 Converted = tuple[Content, tuple[str, ...]]
-"""A content, and remarks on what it does not carry."""
+"""A content, and remarks on what it lacks."""
 Made = tuple[Content, str, tuple[str, ...], str]
-"""Content of a file, a few words on it, remarks, and the analysis that it is of ("" of none)."""
+"""Content of a file, a summary, remarks, and its analysis ("" of none)."""
 
 
 def _motion(convert: Callable[[JointMotions], Converted], what: str, *of: Any) -> Made:
@@ -86,7 +86,7 @@ FORMATS: Mapping[str, Mapping[str, tuple[str, Callable[[Path, str | None, Side],
         "exudyn": (".exudyn.npz", partial(_body, exudyn_file)),
     },
 }
-"""Formats of each kind of file: end of the new file's name, and what makes its content of an analysis and a side."""
+"""Formats of each kind of file: end of the new file's name, and the function that makes its content."""
 SIDED = ("joint-trajectory", "rosbag2")
 """Formats with positions of one side of compliant gears."""
 
@@ -100,11 +100,13 @@ def export_file(
     force: bool = False,
     side: Side | None = None,
 ) -> Exported:
-    """Write a scene, a modal body or a results file in another format; by default beside it, with the analysis' name.
+    """Write a scene, a modal body or a results file in another format (see `FORMATS`), by default next to it.
+
+    `analysis`: default: the first with such content. `side`: side of compliant gears whose positions are written.
 
     Raises:
-        InputError: the file is of another kind, or has nothing to export, or one would be replaced without `force`.
-        SolveError: it cannot be written.
+        InputError: wrong input, nothing to export, or an existing file without `force`.
+        SolveError: the file cannot be written.
     """
     if not path.exists():
         raise InputError(f"{path}: expected a scene, a modal body or a results file", "no such file")
@@ -125,7 +127,7 @@ def export_file(
 
 
 def write_content(target: Path, content: Content, *, force: bool) -> None:
-    """Write all files without overwriting others; identical ones of an interrupted command may exist."""
+    """Write `content` to a file or folder. Raises `InputError` if others exist there; `force` replaces a file."""
     if isinstance(content, str | bytes):
         data = content.encode() if isinstance(content, str) else content
         check_new_file(target, replace=force or holds(target, data))
@@ -142,17 +144,17 @@ READERS: Mapping[str, Callable[[str, str], tuple[ModalBody, tuple[str, ...]]]] =
     ".sid_fem": read_sid,
     ".fem": read_fem,
 }
-"""What reads bodies of other programs, by the end of the file's name."""
+"""Functions that read bodies of other programs, by the end of the file's name."""
 MOTIONS = (*TEXTS, ".bag", ".db3", ".mcap")
 """Ends of files with motions of joints; a folder is a bag of ROS 2."""
 
 
 def import_motion(path: Path, output: Path, *, force: bool = False) -> Exported:
-    """Write the waypoints of a motion of joints as CSV.
+    """Read a motion of joints (JointTrajectory or bag of ROS), and write its waypoints to `output` as CSV.
 
     Raises:
-        InputError: it cannot be read, or is no motion; a file would be replaced without `force`.
-        SolveError: the file cannot be written, or `rosbags` is not installed.
+        InputError: `path` cannot be read or has no motion; `output` exists, without `force`.
+        SolveError: `output` cannot be written, or `rosbags` is not installed.
     """
     motion = read_motion(path)
     write_content(output, path_text(motion), force=force)
@@ -162,11 +164,11 @@ def import_motion(path: Path, output: Path, *, force: bool = False) -> Exported:
 
 
 def import_body(path: Path, output: Path) -> Exported:
-    """Write the modal body file of a body in a format of `READERS`.
+    """Convert a flexible body of another program (SID_FEM, MBDyn) to a modal body file.
 
     Raises:
-        InputError: it cannot be read, or cannot be a body; names the file.
-        SolveError: the modal body file cannot be written.
+        InputError: `path` cannot be read, or its numbers are those of no body.
+        SolveError: `output` cannot be written.
     """
     with naming(path), np.errstate(over="raise", divide="raise", invalid="raise"):
         try:
@@ -210,7 +212,7 @@ def print_import(imported: Imported, console: Console) -> None:
 
 
 def print_export(exported: Exported, console: Console) -> None:
-    """Print the file written, and remarks on what its format cannot hold."""
+    """Print the file written, and remarks on what its format lacks."""
     _print_written([f"{exported.path}: {exported.what}"], exported.remarks, console)
 
 

@@ -1,4 +1,4 @@
-"""Motions of joints: those of results for other programs, and those that other programs planned or recorded."""
+"""Motions of joints: from results to other programs, and from planners and recordings to waypoints."""
 
 import json
 import math
@@ -25,7 +25,7 @@ NANO = 1_000_000_000
 OF_MOTOR = ("motor_coordinate", "motor_rate", "motor_moment")
 """Datasets of a joint with a gear."""
 Side = Literal["motor", "joint"]
-"""Of a compliant gear."""
+"""Side of a compliant gear."""
 
 
 @struct
@@ -33,12 +33,12 @@ class JointMotion:
     """One coordinate of a joint over T outputs; SI units.
 
     Attributes:
-        name: of the joint; "NAME[k]" of coordinate k where it has several.
-        coordinate: (T,) rad, or m along a way.
+        name: name of the joint; "NAME[k]" of coordinate k where it has several.
+        coordinate: (T,) rad or m.
         rate: (T,) rad/s or m/s.
-        moment: (T,) N·m or N, at the joint, behind a gear; None of a joint without motor.
-        motor: `motor_coordinate`, `motor_rate` of a compliant gear, `motor_moment` of one with a rotor (T,), as in
-            results.
+        moment: (T,) torque or force of the motor at the joint, N·m or N; None without motor.
+        motor: datasets (T,) in results: `motor_coordinate`, `motor_rate` (rad or m, 1/s) of a compliant gear,
+            `motor_moment` (N·m or N) of one with a rotor.
     """
 
     name: str
@@ -48,7 +48,7 @@ class JointMotion:
     motor: Mapping[str, Array] = field(default_factory=dict)
 
     def on(self, side: Side) -> tuple[Array, Array]:
-        """Return coordinate and rate (T,) on a side of the gear, rad and rad/s, or m and m/s; of a stiff one alike."""
+        """Return coordinate and rate (T,), rad and rad/s or m and m/s, on a side of the gear; equal if it is stiff."""
         if side == "motor" and "motor_coordinate" in self.motor:
             return self.motor["motor_coordinate"], self.motor["motor_rate"]
         return self.coordinate, self.rate
@@ -56,9 +56,9 @@ class JointMotion:
 
 @struct
 class JointMotions:
-    """Joints of an analysis with their coordinates at `time` (T,), s; `remarks` on restrictions.
+    """Motions of all joints in an analysis at `time` (T,), s; `remarks` on restrictions.
 
-    `side`: of compliant gears, whose positions a JointTrajectory has.
+    `side`: side of compliant gears whose positions a JointTrajectory contains.
     """
 
     analysis: str
@@ -69,7 +69,10 @@ class JointMotions:
 
 
 def robot_motion(path: Path, analysis: str | None, side: Side = "motor") -> JointMotions:
-    """Read joint motions from the results file at `path`; default: the first analysis with moving joints."""
+    """Read joint motions of an analysis (default: the first with some) from the results file at `path`.
+
+    Raises `InputError` where no joint moves.
+    """
     with naming(path), Results(path) as results:
         known = [name for name in results.analyses if any(_moving(results, name))]
         if analysis is not None:
@@ -99,9 +102,9 @@ def _parts(results: Results, analysis: str, joint: str) -> Iterator[JointMotion]
 
 
 def csv_text(motion: JointMotions) -> tuple[str, tuple[str, ...]]:
-    """Return a CSV table, and remarks: `time`, NAME.coordinate, NAME.rate and, with a motor, NAME.moment; SI units.
+    """Return a CSV table and remarks. Columns in SI units: `time`, NAME.coordinate, NAME.rate; with motors NAME.moment.
 
-    Of joints with compliant gears also NAME.motor_coordinate, NAME.motor_rate, NAME.motor_moment.
+    Joints with gears have NAME.motor_coordinate, NAME.motor_rate and NAME.motor_moment, too, as in results.
     """
     columns = {"time": motion.time}
     for joint in motion.joints:
@@ -113,9 +116,9 @@ def csv_text(motion: JointMotions) -> tuple[str, tuple[str, ...]]:
 
 
 def joint_trajectory(motion: JointMotions) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Return a ROS JointTrajectory of one side of compliant gears, and remarks on what it leaves out.
+    """Return a ROS JointTrajectory message as a dictionary, SI units, and remarks on what it leaves out.
 
-    Accelerations stay empty: results have none of joints. Where no joint has a motor, all are taken, without effort.
+    It contains joints with motors; if there are none, all joints, without effort. Accelerations are empty.
     """
     moments = {joint.name: joint.moment for joint in motion.joints if joint.moment is not None}
     left = [joint.name for joint in motion.joints if joint.moment is None] if moments else []
@@ -154,7 +157,7 @@ def joint_trajectory(motion: JointMotions) -> tuple[dict[str, Any], tuple[str, .
 
 
 def joint_trajectory_text(motion: JointMotions) -> tuple[str, tuple[str, ...]]:
-    """Return the message of `joint_trajectory` as JSON, a line for each point; and its remarks."""
+    """Return the JointTrajectory of `joint_trajectory` as JSON, a line for each point; and remarks."""
     message, remarks = joint_trajectory(motion)
     points = ",\n".join(json.dumps(point) for point in message.pop("points"))
     head = json.dumps(message, ensure_ascii=False)
@@ -166,7 +169,10 @@ VERSION = 8  # of the metadata: what ROS 2 Iron and later write, and Humble read
 
 
 def joint_trajectory_bag(motion: JointMotions) -> tuple[Mapping[str, bytes], tuple[str, ...]]:
-    """Return files of a ROS 2 bag by name, SQLite storage, with the message at time zero; and remarks."""
+    """Return files (by name) of a ROS 2 bag with the JointTrajectory of `joint_trajectory`; and remarks.
+
+    Raises `SolveError` if `rosbags` is not installed.
+    """
     with extras():
         from rosbags.rosbag2 import Writer
         from rosbags.typesys import Stores, get_typestore
@@ -211,7 +217,7 @@ def read_record(path: Path) -> Recorded:
     They are in a JSON or YAML file with a JointTrajectory, or in a bag of ROS with one or with JointStates.
 
     Raises:
-        InputError: it has none, or numbers that are no motion; names the file.
+        InputError: the file has no motion, or wrong numbers.
         SolveError: `rosbags` is not installed.
     """
     with naming(path):
@@ -277,7 +283,7 @@ def _names(names: Any) -> list[str]:
 
 
 Row = tuple[float, list[float]]
-"""Time (s) and positions of a point."""
+"""Time (s) and positions (rad or m) of a point."""
 
 
 def _row(joints: Sequence[str], point: Any, k: int, begin: float) -> Row:
@@ -376,9 +382,9 @@ def _of_bag(bag: Any) -> Recorded:
 
 
 def _states(topics: Mapping[str, Iterator[tuple[int, Any]]]) -> Recorded:
-    """Positions by the time of their stamps, the first being zero, of all joints: see `_together`.
+    """Positions of all joints by time stamps from zero on: see `_together`.
 
-    Of a joint on several topics that with most messages counts. Stamps that nobody has set are times of the record.
+    Of several topics with a joint, the one with most messages counts. Times of the record replace unset stamps.
     """
     samples, owner, others = dict[str, list[Sample]](), dict[str, str](), dict[str, list[str]]()
     for topic, messages in topics.items():
@@ -400,14 +406,13 @@ def _states(topics: Mapping[str, Iterator[tuple[int, Any]]]) -> Recorded:
 
 
 Sample = tuple[int, int, float]
-"""Stamp of a message (ns), 0 where nobody has set it, its time in the record (ns), and a position."""
+"""Time stamp of a message (ns; 0: not set), its time in the record (ns), and a position."""
 
 
 def _together(samples: Mapping[str, list[Sample]], remarks: list[str]) -> Recorded:
-    """One table of joints whose samples have times of their own (ns).
+    """One table of joints that are sampled at different times (ns).
 
-    Times are those of the joints with most samples, where all joints have some before and after; others go between
-    theirs by a cubic spline.
+    Times are those of the joints with most samples, within the samples of all; cubic splines interpolate others.
     """
     series = dict[str, tuple[Integers, Array]]()
     clock = 0 if any(stamp for rows in samples.values() for stamp, _, _ in rows) else 1

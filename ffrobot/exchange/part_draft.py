@@ -17,17 +17,17 @@ MATERIALS = (("aluminum", 70e9, 0.33, 2700.0), ("steel", 210e9, 0.3, 7850.0), ("
 AT_END = 1e-3  # of the length: how far a plane end is from the end of the bounding box
 ROUND_JOINT = 0.1  # least radius of a bore for a joint, of the part's extent across
 SQUARE = 0.1  # largest cosine between the axis of such a bore and the part
-ALIKE = 0.02  # extents across that differ by less, relative: principal axes there are as good as any others
+ALIKE = 0.02  # relative difference of extents across, below which principal axes are arbitrary
 NEARLY = 0.98  # cosine between a normal and a direction that may be the same
 DIGITS = 9
 
 
 def draft_link(part: Inspection, file: Path, name: str, folder: Path, density: float | None = None) -> str:
-    """The text of a link file in `folder`: root and tip are the faces that joints most likely take.
+    """Return a draft of the link file `name` in `folder` for the part in `file`.
 
-    These are two bores across the part, else its plane ends. All other plane faces and bores are there as comments.
-    Concentrated masses of a file in m are on the nearest of all these faces. The material is aluminum, or the one of
-    the `density` (kg/m³) that is given; a comment says whose stiffness it has.
+    Root and tip are two bores across the part, else its plane ends; other plane faces and bores become comments.
+    Concentrated masses of a file in m are on the nearest of these. The stiffness is that of the metal nearest to
+    `density` (kg/m³), by default aluminum. Raises `InputError` where nothing can be root and tip.
     """
     root, tip = _ends(part)
     axes, length = _frame(part, root, tip)
@@ -84,7 +84,7 @@ def _principal(part: Inspection) -> tuple[Array, Array]:
 
 
 def _ends(part: Inspection) -> tuple[PartFace, PartFace]:
-    """Root and tip: the root is where the part begins along the axis of the file that is nearest to its own."""
+    """Root and tip: the root is first along the axis of the file that is nearest to the part's."""
     (along, *_), (length, width, _) = _principal(part)
     along = along * np.sign(along[np.abs(along).argmax()])
     bores = [
@@ -116,7 +116,7 @@ def _ends(part: Inspection) -> tuple[PartFace, PartFace]:
 
 
 def _masses(part: Inspection, faces: list[PartFace]) -> dict[PartFace, float]:
-    """The concentrated masses on each face; none of files in another unit of length, whose unit of mass is unknown."""
+    """The concentrated masses on each face; none if the file is not in m, as its unit of mass is unknown."""
     masses = dict[PartFace, float]()
     for mass in part.masses if part.unit == "m" else ():
         face = min(faces, key=lambda face: float(np.linalg.norm(face.center - mass.point)))
@@ -145,8 +145,7 @@ def _frame(part: Inspection, root: PartFace, tip: PartFace) -> tuple[Array, floa
 def _widest(part: Inspection, x: Array) -> Array:
     """The direction in which the part is wide: the normal of the largest plane face that nearly has it, if any.
 
-    Nodes of a mesh show it roughly; where the part is as thick as it is wide, of any large face along x, that of the
-    last axis of the file first.
+    If the part is as thick as wide: the normal of any large face along x, preferably the last axis of the file.
     """
     axes, extent = _principal(part)
     planes = [face for face in part.faces if face.kind == "plane"]

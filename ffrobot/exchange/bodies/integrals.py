@@ -1,4 +1,4 @@
-"""The integrals that the equations of a flexible body consist of, as other programs keep them, and back.
+"""Inertia shape integrals of a flexible body, as files of other programs have them, and back.
 
 Symbols of Wallrapp's standard input data (O. Wallrapp, Standardization of flexible body modeling in multibody system
 codes, Mech. Struct. Mach. 22, 1994, 283–304), to first order in the modal coordinates q:
@@ -38,7 +38,7 @@ PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 
 @struct
 class ShapeIntegrals:
-    """Inertia shape integrals of a body with n modes; SI units, axes of the body."""
+    """Inertia shape integrals of a body with n modes, shapes Φ in 1/√kg; SI units, axes of the body."""
 
     mass: float  # m in kg
     first_moment: Array  # (3,) m c in kg·m
@@ -46,8 +46,8 @@ class ShapeIntegrals:
     inertia: Array  # (3, 3) J_0 about the origin, kg·m²
     inertia_slope: Array  # (3, 3, n) J_l
     spin: Array  # (3, n) ∫ρ x × Φ_l dV = C_r0ᵀ
-    spin_slope: Array  # (3, n, n) ∫ρ Φ_k × Φ_l dV at [l, k]
-    modal_mass: Array  # (n, n) M_e
+    spin_slope: Array  # (3, n, n) ∫ρ Φ_k × Φ_l dV of modes k, l at [l, k], no unit
+    modal_mass: Array  # (n, n) M_e, no unit
     centrifugal_slope: Array  # (6, n, n) ∫ρ Φ_lᵀ ω~ω~ Φ_k dV at [l, k], for ω_a ω_b of `PAIRS`; both orders where a ≠ b
     # stiffness, damping: (n, n), of modal coordinates in m·√kg: 1/s² and 1/s
     stiffness: Array
@@ -60,7 +60,7 @@ class ShapeIntegrals:
 
     @property
     def I_bar(self) -> Array:
-        """Return ∫ρ x_k Φ_l dV at [k, l] (3, 3, n), √kg·m, from the symmetric part in J_l and the rest in C_r0."""
+        """Return ∫ρ x_k Φ_l dV at [k, l] (3, 3, n), √kg·m, with rows Φ_x, Φ_y, Φ_z of Φ (Shabana's Ī_kl)."""
         trace = np.einsum("aan->n", self.inertia_slope) / 4
         symmetric = trace * np.eye(3)[:, :, None] - self.inertia_slope / 2
         return symmetric + 0.5 * np.einsum("abc,an->bcn", LEVI_CIVITA, self.spin)
@@ -83,7 +83,7 @@ class ShapeIntegrals:
 
     @property
     def S_bar_kl(self) -> Array:
-        """Return ∫ρ Φ_kᵀ Φ_l dV at [k, l] (3, 3, n, n), from symmetric parts in O_e and other parts in C_r; no unit."""
+        """Return ∫ρ Φ_kᵀ Φ_l dV at [k, l] (3, 3, n, n), with rows Φ_x, Φ_y, Φ_z of Φ (Shabana's S̄_kl); no unit."""
         n = self.n_modes
         S = np.zeros((3, 3, n, n))
         for k, (a, b) in enumerate(PAIRS):
@@ -101,7 +101,7 @@ class ShapeIntegrals:
         return self.inertia - point_inertia(self.mass, self.first_moment / self.mass)
 
     def transformed(self, T: Array) -> ShapeIntegrals:
-        """Return the integrals in modal coordinates p (m,) with q = T p, T (n, m)."""
+        """Return the integrals in modal coordinates p (m,) with q = T p, T (n, m) in units of q over those of p."""
         linear = {key: getattr(self, key) @ T for key in ("S_bar", "inertia_slope", "spin")}
         squares = ("spin_slope", "modal_mass", "centrifugal_slope", "stiffness", "damping")
         return replace(self, **linear, **{key: T.T @ getattr(self, key) @ T for key in squares})
@@ -125,7 +125,7 @@ def integrals_of(body: ModalBody) -> ShapeIntegrals:
 
 
 def slopes(S: Array) -> dict[str, Array]:
-    """Return `spin_slope` (3, n, n) and `centrifugal_slope` (6, n, n) of S (3, 3, n, n) = ∫ρ Φ_kᵀ Φ_l dV; no unit."""
+    """Return `spin_slope` (3, n, n), `centrifugal_slope` (6, n, n) by S (3, 3, n, n), Shabana's S̄_kl; no unit."""
     centrifugal = [S[a, a] - np.trace(S) if a == b else S[a, b] + S[b, a] for a, b in PAIRS]
     spin = np.einsum("abc,bckl->alk", LEVI_CIVITA, S)
     return {"spin_slope": spin, "centrifugal_slope": np.array(centrifugal)}
@@ -134,8 +134,7 @@ def slopes(S: Array) -> dict[str, Array]:
 def _with_agreed_masses(integrals: ShapeIntegrals) -> tuple[ShapeIntegrals, tuple[str, ...]]:
     """Adjust modal masses to those of the mode shapes; returns the integrals and a remark on the change, if any.
 
-    In files of few digits M_e is off ∫ρΦᵀΦ of masses and shapes. Where nothing has inertia about the axis, so that no
-    section can account for that, ∫ρΦᵀΦ is taken.
+    In files of few digits M_e is off ∫ρΦᵀΦ. This replaces it where no section with inertia about x explains that.
     """
     M, translational = integrals.modal_mass, integrals.translational_mass
     mean = np.sum(integrals.S_bar**2, axis=0) / integrals.mass
@@ -159,11 +158,11 @@ def _with_agreed_masses(integrals: ShapeIntegrals) -> tuple[ShapeIntegrals, tupl
 
 
 def _section_inertia(integrals: ShapeIntegrals) -> dict[str, Array | float]:
-    """J_spin, h_spin, S_spin and second_moment of `ModalBody`: formats have the sums alone that these make.
+    """J_spin, h_spin, S_spin and second_moment of `ModalBody`, of which formats have sums only.
 
-    Where sections turn (M_e is more than ∫ρΦᵀΦ) all of the inertia about x that no mass beside the axis needs is booked
-    as theirs: J_s = 1/(J⁻¹)_xx about the center of mass, and h_s = C_r0 about x, both exact of a line of mass. Where
-    that is more than S_s allows, of a line with masses that turn as well, C_r0 stays in I_bar.
+    Where sections turn (M_e exceeds ∫ρΦᵀΦ), the inertia about x that no mass off the axis needs is theirs:
+    J_s = 1/(J⁻¹)_xx about the center of mass, and h_s = C_r0 about x, both exact for a line of mass. If S_s does not
+    allow h_s, as for a line with masses that turn, C_r0 stays in I_bar.
     """
     turning = integrals.modal_mass - integrals.translational_mass
     J_spin, h_spin = 0.0, np.zeros(integrals.n_modes)
@@ -180,12 +179,12 @@ def _section_inertia(integrals: ShapeIntegrals) -> dict[str, Array | float]:
 
 
 Nodes = Mapping[int, Interface]
-"""Points whose motion a format has, by their numbers there."""
+"""Points of a body by their numbers in a format."""
 PARTS = ("position", "translation", "rotation")
 
 
 def nodes_of(body: ModalBody) -> tuple[dict[int, Interface], dict[str, int]]:
-    """Stations, then interfaces that are at none of them, by numbers from 1; and the number of each interface."""
+    """Return stations, then interfaces at other places, by node number from 1; and the node of each interface."""
     stations = zip(*(getattr(body.stations, part) for part in PARTS), strict=True)
     nodes = {number: Interface(*parts) for number, parts in enumerate(stations, 1)}
     numbers = dict[str, int]()
@@ -201,7 +200,7 @@ def nodes_of(body: ModalBody) -> tuple[dict[int, Interface], dict[str, int]]:
 
 
 def note(body: ModalBody, numbers: Mapping[str, int]) -> str:
-    """Return a comment for what formats lack, which `_noted` reads: reference condition, numbers of interfaces."""
+    """Return a comment with the reference condition and the node number of each interface, which formats lack."""
     return f"ffrobot: {body.reference_condition}; {', '.join(f'{name}={number}' for name, number in numbers.items())}"
 
 
@@ -240,7 +239,10 @@ NOT_IN_THE_FILE = (
 
 
 def modal_body(name: str, integrals: ShapeIntegrals, nodes: Nodes, text: str) -> tuple[ModalBody, tuple[str, ...]]:
-    """The body of foreign integrals and nodes, with modes of unit mass, and remarks; `text` may have a `note`."""
+    """Return a modal body, with modes of unit mass, of integrals and nodes in a file; and remarks on losses.
+
+    `text` may contain a `note`. Raises `InputError` for masses or stiffnesses that contradict each other.
+    """
     condition, numbers = _noted(text, nodes)
     integrals, remarks = _with_agreed_masses(integrals)
     T, omega2 = _orthonormal(integrals)
@@ -306,7 +308,7 @@ def _orthonormal(integrals: ShapeIntegrals) -> tuple[Array, Array]:
 
 
 def _condition(interfaces: Mapping[str, Interface]) -> str:
-    """Cantilever where the root does not move in the frame; the other name stands for all else."""
+    """Cantilever if the root does not move in the frame; else the other name."""
     sizes = {name: np.abs(at.translation).max(initial=0.0) for name, at in interfaces.items()}
     return "cantilever" if sizes["root"] <= 1e-9 * max(sizes.values()) else "simply-supported"
 

@@ -1,12 +1,11 @@
-"""Bodies as matrices in .npz files: for EXUDYN, and Craig–Bampton's for programs that take M, K and C.
+"""Bodies as matrices in .npz files, for EXUDYN, and Craig–Bampton's.
 
-What EXUDYN's ObjectFFRFreducedOrderInterface.LoadFromFile reads, in the notation of A. Zwölfer and J. Gerstmayr (Acta
-Mech. 231, 2020): a~ is the matrix of the cross product with a, and of a mode ψ_l, three columns 3l … 3l + 2. Then
+EXUDYN's ObjectFFRFreducedOrderInterface.LoadFromFile has the notation of A. Zwölfer and J. Gerstmayr (Acta Mech. 231,
+2020): a~ is the matrix of the cross product with a, and of a mode ψ_l, three columns 3l … 3l + 2. Then
 ∫ρ a~ᵀ b = −∫ρ a×b and ∫ρ a~ᵀ b~ = ∫ρ [(a·b) E − b aᵀ].
 
-Craig–Bampton coordinates: tx ty tz rx ry rz of each interface, root first, then the modes of the link held at all of
-them; the link is free in space, so that K has six eigenvalues of zero. This is the order of MATLAB's and Simscape's
-reduced order models and of Newton's `ModalGeneratorCraigBampton`.
+Craig–Bampton coordinates: tx ty tz rx ry rz of each interface, root first, then fixed-interface modes; the link is
+free, so that K has six zero eigenvalues. MATLAB's and Simscape's reduced order models have the same order.
 """
 
 import io
@@ -26,7 +25,7 @@ REMARKS = (
 
 
 def exudyn_file(body: ModalBody) -> tuple[bytes, tuple[str, ...]]:
-    """Return the .npz content of a body for EXUDYN, SI units, and remarks: order of the nodes, what is lost."""
+    """Return the content of EXUDYN's .npz file of a body, SI units, and remarks on node numbers and losses."""
     nodes, numbers = nodes_of(body)
     arrays = _reduced_order(integrals_of(body)) | {
         "modeBasis": np.concatenate([at.translation for at in nodes.values()]),
@@ -71,9 +70,11 @@ LOST = (
 
 
 def craig_bampton_file(body: ModalBody) -> tuple[bytes, tuple[str, ...]]:
-    """An .npz file with M, K, C (m, m) by the m `coordinates` (m, rad), SI units, and remarks.
+    """Return an .npz file with matrices M, K, C (c, c), SI units, and remarks on what they lack.
 
-    `origins` (i, 3), m, are where the `interfaces` are, `recovery` (3 k, m) are displacements of `points` (k, 3), m.
+    The c `coordinates` are displacements and rotations (m, rad) of the i `interfaces` at `origins` (i, 3), m, then
+    modal ones. `recovery` (3 k, c): displacements of k `points` (k, 3), m, per unit of coordinates. Raises
+    `InputError` for other bodies.
     """
     if body.reference_condition != CONDITION:
         raise InputError(

@@ -1,7 +1,7 @@
 """Modal elements of MBDyn: `.fem` files (MBDyn input manual, joint `modal`), a sequence of numbered records.
 
-Written with the rigid body inertia of record 12 and the invariants of records 14 to 18 (Inv3, Inv4, Inv8, Inv5, Inv9),
-which newer versions of MBDyn read. Read from these, else from the lumped masses of record 11.
+Files are written with rigid body inertia (record 12) and invariants (records 14 to 18), which newer versions of MBDyn
+read. They are read from these, else from the lumped masses of record 11.
 
     Inv3 = ∫ρ Φ   Inv4 = ∫ρ x×Φ   Inv8_j = −∫ρ x~ Φ~_j   Inv5_jk = ∫ρ Φ_j×Φ_k   Inv9_jk = ∫ρ Φ~_j Φ~_k
 """
@@ -36,7 +36,7 @@ REMARKS = (
 
 
 def fem_text(body: ModalBody) -> tuple[str, tuple[str, ...]]:
-    """Return the text of a body's MBDyn .fem file, and remarks on what the format cannot hold."""
+    """Return the text of a body's MBDyn .fem file, and remarks on losses."""
     integrals, (nodes, numbers) = integrals_of(body), nodes_of(body)
     n, S = integrals.n_modes, integrals.S_bar_kl
     x, y, z = np.array([at.position for at in nodes.values()]).T[:, :, None]
@@ -75,7 +75,7 @@ def _lines(rows: Iterable[Iterable[float]]) -> Iterator[str]:
 
 
 def read_fem(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
-    """The body in the text of a .fem file, and remarks on it."""
+    """Return the modal body `name` by the text of a .fem file, and remarks on losses. Raises `InputError`."""
     records = _records(text)
     labels = [int(value) for value in _numbers(records, 2)]
     count = len(labels)

@@ -1,7 +1,7 @@
 """Standard input data of flexible bodies, SID_FEM files (Wallrapp 1994), which SIMPACK, EMBSlib and pymbs read.
 
-Written as PY_SID writes them: J as six rows xx yy zz xy xz yz, M1 as (row, mode, column), G_r by mode, G_e by axis
-Read in other dialects too: J as (3, 3), M1 as (row, column, mode).
+Files are written as by PY_SID: J as six rows xx yy zz xy xz yz, M1 as (row, mode, column), G_r by mode, G_e by axis.
+Other dialects are read, too: J as (3, 3), M1 as (row, column, mode).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ SAME = 1e-3  # symmetric parts of G_e and C_r, of the largest; rad
 
 
 def sid_text(body: ModalBody) -> tuple[str, tuple[str, ...]]:
-    """Return the text of a body's SID_FEM file, and remarks on what the format cannot hold."""
+    """Return the text of a body's SID_FEM file, and remarks on losses."""
     integrals, (nodes, numbers) = integrals_of(body), nodes_of(body)
     lines = [f"{len(nodes):5d}{integrals.n_modes:5d}    : nodes, modes : {body.name} : {note(body, numbers)}", " part"]
     lines += ["      new modal                        =", "           refmod"]
@@ -75,7 +75,7 @@ def _integral_lines(integrals: ShapeIntegrals) -> Iterator[str]:
 
 
 def read_sid(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
-    """The body in the text of a SID_FEM file, and remarks on it."""
+    """Return the modal body `name` by the text of a SID_FEM file, and remarks on losses. Raises `InputError`."""
     head, top = _parse(text)
     part = top["part"]
     modal = Modal(next((one for one in part.inside if one.name == "modal"), None) or part["modal"])
@@ -93,7 +93,7 @@ def _interface(modal: Modal, node: SidObject) -> Interface:
 
 
 def _turned_nodes(modal: Modal) -> Iterator[str]:
-    """A line on nodes whose own axes, A_P, are not those of the body, which interfaces here have."""
+    """A line on nodes whose axes A_P are not those of the body, as interfaces need."""
     turned = [
         node.keys["number"]
         for node in modal.nodes
@@ -142,7 +142,7 @@ def _symmetric_part(slope: Array, Me: Array) -> Array | None:
 
 
 def _is_in_both(modal: Modal, slope: Array) -> bool:
-    """Whether G_e has twice the symmetric part that C_r has: geometric stiffness would be in C_r alone."""
+    """Whether G_e has twice the symmetric part of C_r: geometric stiffness is in C_r alone."""
     n = modal.modes
     Ge = modal["Ge", (n, 3 * n)].m0
     layouts = (Ge.reshape(n, 3, n).transpose(1, 0, 2), Ge.reshape(n, n, 3).transpose(2, 0, 1))
@@ -182,7 +182,7 @@ SYMMETRIC, IDENTITY = 2, 4  # values of `structure`
 
 
 class Taylor(NamedTuple):
-    """A matrix M0 (rows, columns) + Σ_l M1[:, l] q_l with M1 (rows, modes, columns)."""
+    """A matrix M0 (rows, columns) + Σ_l M1[:, l] q_l with M1 (rows, modes, columns), in the file's units."""
 
     m0: Array
     m1: Array
@@ -190,7 +190,7 @@ class Taylor(NamedTuple):
 
 @dataclass
 class SidObject:
-    """An object of the file: its keys, and the objects inside, by name and in order."""
+    """An object of a SID_FEM file: its keys with their values as text, and the objects inside it."""
 
     name: str
     keys: dict[str, str] = field(default_factory=dict)
@@ -203,7 +203,7 @@ class SidObject:
         raise InputError(f"expected the object {name} in {self.name}", "none")
 
     def number(self, key: str) -> float:
-        """Return the value of a key; raises `InputError` where there is none, or no number."""
+        """Return the number that a key has. Raises `InputError` where there is none."""
         if key not in self.keys:
             raise InputError(f"{self.name}: expected the key {key}", "none")
         return number_of(self.keys[key], f"{self.name}: {key}")
@@ -233,7 +233,7 @@ def _parse(text: str) -> tuple[str, SidObject]:
 
 
 class Modal:
-    """The object `modal` as `root`, with so many `modes` and the objects `nodes`; its matrices are read by name."""
+    """Object `modal` of a SID_FEM file: `root`, number of `modes`, `nodes`; `modal[NAME]` is a matrix."""
 
     def __init__(self, root: SidObject) -> None:
         self.root, self.modes = root, int(root["refmod"].number("nelastq"))
@@ -249,7 +249,7 @@ class Modal:
         return self.taylor(self.root[name], *sizes)
 
     def taylor(self, matrix: SidObject, *sizes: tuple[int, int]) -> Taylor:
-        """Return the matrix of an object, which has one of the `sizes` (rows, columns) if there are any."""
+        """Return the matrix in an object. Raises `InputError` unless it has one of `sizes` (rows, columns), if any."""
         nrow, ncol = (int(matrix.number(key)) for key in ("nrow", "ncol"))
         is_possible = nrow > 0 and ncol > 0 and nrow * ncol * (self.modes + 1) <= MOST
         if not is_possible or (sizes and (nrow, ncol) not in sizes):

@@ -1,4 +1,4 @@
-"""What FMUs (FMI 2.0) say of themselves, and the archive that they are in."""
+"""Model description and archive of FMUs (FMI 2.0)."""
 
 import platform
 import re
@@ -31,12 +31,12 @@ UNITS: Mapping[str, Mapping[str, int]] = {
     "kg0.5.m/s": {},
     "kg0.5.m/s2": {},
 }
-"""Exponents of SI base units. Those of modal coordinates of unit mass are not whole, which FMI has no way to say."""
+"""Exponents of SI base units; none for modal coordinates, since FMI has no fractional exponents."""
 
 
 @struct
 class Variable:
-    """A name in the results, its unit (of `UNITS`) and a few words."""
+    """Variable of an FMU: name as in results, unit (a key of `UNITS`) and description."""
 
     name: str
     unit: str
@@ -44,13 +44,13 @@ class Variable:
 
 
 def motor(name: str, unit: str) -> Variable:
-    """Return the input variable of the motor of a joint coordinate with this unit ("rad" or "m")."""
+    """Return the input variable of the motor of a joint coordinate in "rad" or "m": torque N·m, or force N."""
     what, of_force = ("force", "N") if unit == "m" else ("moment", "N.m")
     return Variable(f"joint/{name}/moment", of_force, f"{what} of the motor of {name}")
 
 
 def voltage(layout: str, number: int) -> Variable:
-    """Return the input variable of patch `number` of a layout, V."""
+    """Return the input variable, V, of patch `number` (from 1) of a patch layout."""
     return Variable(f"pzt/{layout}/{number}", "V", f"voltage of patch {number} of {layout}")
 
 
@@ -60,7 +60,7 @@ def numbered(joint: str, number: int, count: int) -> str:
 
 
 def new_root(name: str, guid: str, about: str) -> Element:
-    """Return the root of a model description, still empty."""
+    """Return an empty root element of a model description, with the description `about`."""
     return Element(
         "fmiModelDescription", fmiVersion="2.0", modelName=name, guid=guid, description=about,
         generationTool=f"ffrobot {VERSION}", variableNamingConvention="flat", numberOfEventIndicators="0",
@@ -73,7 +73,7 @@ ATTRIBUTES: Mapping[str, Mapping[str, str]] = {
     "inputs": {"causality": "input"},
     "outputs": {"causality": "output", "initial": "calculated"},
 }
-"""Of the variables of each group."""
+"""FMI's attributes of the variables of each group."""
 
 
 def finished(
@@ -83,10 +83,10 @@ def finished(
     references: Iterable[int],
     structure: Mapping[str, Mapping[int, list[int]]],
 ) -> bytes:
-    """The modelDescription.xml (UTF-8), with units, log, experiment, variables and structure after what `root` has.
+    """Return modelDescription.xml (UTF-8): `root` with units, log, experiment, variables and structure added.
 
-    `groups` are those of `ATTRIBUTES`; `references` are the value references of all variables in order. `structure` has
-    by its element the variables that each variable depends on, by their numbers from 1.
+    `groups`: variables by the keys of `ATTRIBUTES`. `references`: value references of all variables in order.
+    `structure`: dependencies of variables by element of <ModelStructure>; numbers of variables from 1.
     """
     definitions, units = add(root, "UnitDefinitions"), {one.unit for group in groups.values() for one in group}
     for name, exponents in UNITS.items():
@@ -133,7 +133,7 @@ PLATFORMS: Mapping[tuple[str, str], tuple[str, str]] = {
 
 
 def platform_here() -> tuple[str, str]:
-    """Return its entry of `PLATFORMS`. Raises `InputError` where FMI has no name for it."""
+    """Return this machine's entry of `PLATFORMS`. Raises `InputError` if FMI 2.0 has no name for it."""
     here = sys.platform, platform.machine()
     if here not in PLATFORMS:
         raise InputError(f"--format fmu: FMI 2.0 has no name for {here[0]} on {here[1]}")
@@ -141,13 +141,13 @@ def platform_here() -> tuple[str, str]:
 
 
 def guid_of(numbers: str, variables: Iterable[Variable]) -> str:
-    """Return the GUID of a model, the same for the same numbers and names of variables."""
+    """Return the GUID of a model: a hash of its `numbers` as text and of the names of its variables."""
     names = "\n".join(each.name for each in variables)
     return f"{{{uuid5(NAMESPACE_URL, numbers + names)}}}"
 
 
 def identifier_of(scene: str, analysis: str) -> str:
-    """Return an identifier valid in C, also used in the name of the binary."""
+    """Return a C identifier from both names, which also names the FMU's library."""
     plain = re.sub(r"[^A-Za-z0-9_]", "_", f"{scene}_{analysis}")[:LONGEST]
     return plain if plain[0].isalpha() else f"robot_{plain}"[:LONGEST]
 

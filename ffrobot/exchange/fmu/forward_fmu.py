@@ -47,7 +47,10 @@ LIBRARY = "ffrobot_fmu.so"  # beside the core (CMakeLists.txt)
 
 
 def forward_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str, ...], str]:
-    """The FMU of an analysis of kind "forward", the first if not named; a few words on it, remarks, its name."""
+    """Return the FMU of a forward analysis (default: the first), a summary, remarks, and the analysis' name.
+
+    Raises `InputError` for scenes and machines for which there are no such FMUs.
+    """
     scene = load_scene(path)
     with naming(path):
         chosen = _chosen(scene, analysis)
@@ -105,15 +108,15 @@ COMPONENTS = ("xx", "yy", "zz", "yz", "xz", "xy")  # the last three are 2 ε, as
 AXES = "xyz"
 
 Input = tuple[Variable, Array]
-"""A variable, and what a unit of it does along v (n_v,)."""
+"""A variable, and its generalized force (n_v,) per unit."""
 Linear = tuple[Variable, _core.LinearOutput]
 
 
 @struct
 class ForwardUnit:
-    """Inputs and outputs, and the `data` of the model.
+    """Variables of an FMU of a forward motion, and the model `data` for its library.
 
-    The library numbers inputs, then outputs; `references` are the numbers of those that the FMU has.
+    `references`: value references of inputs and outputs, which are their numbers in the library.
     """
 
     inputs: tuple[Variable, ...]
@@ -146,7 +149,7 @@ def _forward_unit(model: Model, prepared: Prepared, analysis: Forward, axes: str
 
 
 def _motors(model: Model) -> Iterator[Input]:
-    """Behind a compliant gear they act on its motor."""
+    """Inputs of motors; those before compliant gears act there."""
     units = {joint.name: joint.units for joint in model.scene.joint}
     for joint, columns in model.motors.items():
         for k, (column, unit) in enumerate(zip(columns, units[joint], strict=True), 1):
@@ -191,10 +194,7 @@ def _has_own_coordinates(node: Node) -> bool:
 
 
 def _modes_and_strains(model: Model, links: Mapping[str, ModalBody]) -> Iterator[Linear]:
-    """Modal coordinates of the file of each body, then strains at points of links where files have them, link axes.
-
-    Of a planar scene those that move in its plane.
-    """
+    """Modal coordinates in each body's file, then strains at points, link axes; of 2D scenes those in the plane."""
     rows = list[tuple[Node, Variable, Array]]()
     for node in model.tree.nodes:
         name, T = node.body.name, node.body.modal_transform

@@ -1,4 +1,4 @@
-"""`ffrobot export`: the linear model of an analysis, or the controller of a loop, as an FMU or as numbers in C."""
+"""`ffrobot export`: the linear model of an analysis, or its controllers, as an FMU or as numbers in C."""
 
 import os
 import shlex
@@ -37,12 +37,12 @@ from .description import (
 
 @struct
 class Unit:
-    """Names, variables and model of an FMU."""
+    """A linear model as an FMU: names, variables, matrices."""
 
-    identifier: str  # of C, in the name of the binary
-    name: str  # for people, with `description`
+    identifier: str  # in C, and name of the library
+    name: str  # displayed, as `description`
     description: str
-    guid: str  # of the model's numbers; the binary has the same
+    guid: str  # of the model's numbers; the library has the same
     model: StateSpace
     # states, inputs, outputs: in the order of the rows and columns of `model`
     states: tuple[Variable, ...]
@@ -51,7 +51,10 @@ class Unit:
 
 
 def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str, ...], str]:
-    """The FMU of an analysis with linear models, the first if not named; a few words on it, remarks, its name."""
+    """Return the FMU of an analysis with linear models (default: the first), a summary, remarks, the analysis' name.
+
+    Raises `InputError` where there is no such model.
+    """
     unit, models, remarks, name = _unit(path, analysis)
     if len(models) > 1:
         remarks.append(f"the controllers at {models[0].time:g} s; --format c has all of their schedule")
@@ -68,7 +71,7 @@ def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str,
 
 
 def c_table(path: Path, analysis: str | None) -> tuple[str, str, tuple[str, ...], str]:
-    """Return a C header with the matrices, of all instants of a schedule; else as `linear_fmu`."""
+    """Return a C header with A, B, C, D (all of a schedule), and the rest as `linear_fmu`."""
     unit, models, remarks, name = _unit(path, analysis)
     return _header(unit, models), _what(name, unit), tuple(remarks), name
 
@@ -110,7 +113,7 @@ def _unit(path: Path, analysis: str | None) -> tuple[Unit, list[StateSpace], lis
 
 
 def make_unit(scene: str, analysis: str, model: StateSpace, units: Mapping[str, str]) -> Unit:
-    """Names and variables of the FMU of a model; `units` of the joints' coordinates, see `joint_units`."""
+    """Return the FMU's names, variables and matrices of a model; `units`: see `joint_units`."""
     states, inputs, outputs = linear_variables(model, units)
     return Unit(
         identifier=identifier_of(scene, analysis),
@@ -132,7 +135,7 @@ RATE = "rate of "
 
 
 def joint_units(scene: Mapping[str, Any]) -> dict[str, str]:
-    """Unit ("rad" or "m") of each coordinate of the joints of a scene, by its name as of `numbered`."""
+    """Return "rad" or "m" of each joint coordinate of a scene, by name ("JOINT", or "JOINT 1" of several)."""
     units = dict[str, str]()
     for joint in scene.get("joint", ()):
         record = JOINT_TYPES[joint["type"]]  # types that the plane has too have the same units there
@@ -144,10 +147,10 @@ def joint_units(scene: Mapping[str, Any]) -> dict[str, str]:
 def linear_variables(
     model: StateSpace, units: Mapping[str, str]
 ) -> tuple[tuple[Variable, ...], tuple[Variable, ...], tuple[Variable, ...]]:
-    """States, inputs and outputs; `units` of the joints' coordinates, see `joint_units`.
+    """Return variables of states, inputs and outputs; `units`: see `joint_units`.
 
-    FMI wants names once: a motor is "joint/NAME/moment", as in results, since "joint/NAME" is an output, "state "
-    stands before a state whose name an output has, too, and "measured " before patches that are sensors.
+    Names in FMUs are unique: a motor is "joint/NAME/moment", as "joint/NAME" is an output; a state with the name of
+    an output has the prefix "state ", a sensor patch "measured ".
     """
     seen, driven = model.output_names, model.input_names
     if model.step:  # a controller reads, and commands
@@ -289,10 +292,7 @@ COMPILERS = ("cc", "gcc", "clang")
 
 
 def _binary(unit: Unit, files: Mapping[str, str]) -> dict[str, bytes] | str:
-    """The library for this platform by its path in the FMU, compiled by the environment's CC, else one of `COMPILERS`.
-
-    The reason where there is none.
-    """
+    """The library for this platform by its path in the FMU, compiled by CC, else one of `COMPILERS`; else a reason."""
     try:
         folder, suffix = platform_here()
     except InputError as error:

@@ -1,1 +1,1 @@
-"""URDF robot descriptions: read, checked, and written as scenes in space."""
+"""URDF robot descriptions: read, checked, and written as 3D scenes."""

@@ -1,4 +1,4 @@
-"""`ffrobot export SCENE.toml --format urdf`: a scene in space as a URDF, its links rigid, for viewers."""
+"""`ffrobot export SCENE.toml --format urdf`: a 3D scene as a URDF, its links rigid, for viewers."""
 
 import logging
 from collections.abc import Iterator, Mapping, Sequence
@@ -32,12 +32,12 @@ LIMITS = {"position_limit", "moment_limit", "speed_limit", "viscous_friction", "
 
 
 class Step(NamedTuple):
-    """One joint of a URDF."""
+    """One of the URDF's joints that replace a joint of the scene."""
 
-    type: str  # in URDF; "revolute" turns without end where the scene has no limit: then it is "continuous"
-    axis: int = 2  # number of the axis, of the joint's triad
-    coordinate: int = 0  # number of the scene's coordinate that it has, −1 where it has none
-    label: str = ""  # added to the joint's name where it has several steps
+    type: str  # in URDF; "revolute" is written as "continuous" where the scene has no limit
+    axis: int = 2  # number of the axis in the joint's triad
+    coordinate: int = 0  # number of the coordinate of the scene's joint, −1 for none
+    label: str = ""  # added to the joint's name where several steps replace it
 
 
 STEPS: Mapping[str, tuple[Step, ...]] = {
@@ -51,13 +51,13 @@ STEPS: Mapping[str, tuple[Step, ...]] = {
     "universal": (Step("revolute", 0, 0, "first"), Step("revolute", 1, 1, "second")),
     "spherical": (Step("revolute", 0, -1, "x"), Step("revolute", 1, -1, "y"), Step("revolute", 2, -1, "z")),
 }
-"""By the type of joint in scenes, from the first side to the second."""
+"""Steps of each type of joint in scenes, from its first side to the second."""
 
 
 def _steps_outward(joint: JointRecord, backwards: bool) -> list[tuple[Step, Array]]:
-    """The steps from the inner side, each with its axis (3,) in the axes of the outer side where coordinates are zero.
+    """The steps from the inner side, each with its axis (3,) in axes of the outer side at coordinates of zero.
 
-    Where the second side carries the first, `backwards`, steps come in the other order, about axes the other way.
+    If the second side carries the first, `backwards`, steps and axes are reversed.
     """
     steps, sign = STEPS[joint.type], -1.0 if backwards else 1.0
     triad = sign * joint.triads()[0 if backwards else 1]
@@ -115,7 +115,7 @@ def _of_keys(tree: KinematicTree, size: float) -> Iterator[str]:
 
 
 def scene_as_urdf(path: Path) -> tuple[str, str, tuple[str, ...]]:
-    """Return the text of the URDF, a summary, and remarks on what it cannot hold."""
+    """Return a scene file as text of a URDF, a summary, and remarks on losses. Raises `InputError` for 2D scenes."""
     scene = load_robot(path)
     if scene.is_planar:
         raise InputError(
@@ -134,9 +134,9 @@ class UrdfOfScene:
     """A scene as a URDF: the frame of a link has the axes of its body, its origin at the joint that carries it.
 
     Attributes:
-        root: the element <robot>; joints have the coordinates of the scene where URDF has them.
-        tree: of the scene.
-        size: of the robot, m.
+        root: the element <robot>.
+        tree: joint tree of the scene.
+        size: size of the robot, m.
     """
 
     def __init__(self, scene: Scene, loaded: Mapping[str, LoadedBody]) -> None:

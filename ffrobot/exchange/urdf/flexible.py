@@ -1,4 +1,4 @@
-"""Link files of flexible links of a robot: where their axes stand, how long they are, where their joints are.
+"""Link files of flexible links of a robot: axes, lengths, and positions of joints.
 
 The x axis of the link goes from the joint that carries it to the one beyond (the farthest, if there are several); z is
 along the axis of the carrying joint as far as that is square to x, so that "in-plane" is the plane in which it swings.
@@ -32,16 +32,19 @@ class ImportedLink:
     """A link of the URDF that a link file describes; its interface "root" is at the carrying joint."""
 
     name: str
-    file_name: str  # of the link file beside the scene
-    place: Place  # of the URDF's link frame in the axes of the link file
-    keys: Mapping[str, Any]  # of the link file
-    table: LinkTable  # the same, before there is a folder for it
-    point_of: Mapping[str, str]  # by the name of each joint beyond, the interface that it is on
-    remarks: tuple[str, ...]  # on what was taken from where
+    file_name: str  # of the new link file next to the scene
+    place: Place  # pose of the URDF's link frame in axes of the link file
+    keys: Mapping[str, Any]  # content of the link file
+    table: LinkTable  # the same as a source of links, before the file exists
+    point_of: Mapping[str, str]  # interface of each joint that the link carries, by joint
+    remarks: tuple[str, ...]  # on values taken from the URDF or the part
 
 
 def flexible_link(robot: Robot, name: str, source: Path, folder: Path, stem: str) -> ImportedLink:
-    """The link `name` from the link file at `source`, for a scene in `folder`, where its file is `stem`.toml."""
+    """Return the URDF's link `name` by the link file `source`; its new file is to be `folder`/`stem`.toml.
+
+    Raises `InputError` where the link file contradicts the URDF.
+    """
     if name not in robot.links:
         known = did_you_mean(name, robot.links)
         raise InputError(f"--flexible {shown(name)}: expected a link of the URDF", f"none of this name{known}")
@@ -74,7 +77,7 @@ def flexible_link(robot: Robot, name: str, source: Path, folder: Path, stem: str
 
 
 def _axes(robot: Robot, name: str, tip: UrdfJoint | None) -> Array:
-    """(3, 3) axes of the link file, columns, in those of the URDF's link; these themselves where no joint is beyond."""
+    """(3, 3) axes of the link file, columns, in those of the URDF's link; the same if it carries no joint."""
     if tip is None or not any(tip.origin.xyz):
         return np.eye(3)
     x = unit(np.array(tip.origin.xyz))
@@ -88,7 +91,7 @@ def _axes(robot: Robot, name: str, tip: UrdfJoint | None) -> Array:
 
 
 def _set_length(geometry: dict[str, Any], tip: UrdfJoint | None, name: str, source: Path, remarks: list[str]) -> float:
-    """That of the file, which has to be the distance of the joints; or that distance, where the file has none."""
+    """Length in the file, which must be the distance of the joints; by default that distance."""
     given = geometry.get("length")
     if tip is None:
         if not isinstance(given, int | float):
@@ -139,7 +142,7 @@ def _interfaces(
 
 @struct
 class JointAxis:
-    """A joint of the link: its `name`, `point` (3,), m, and `direction` (3,) in axes of the link file."""
+    """A joint on a link: `point` (3,), m, and `direction` (3,) of any length, in axes of the link file."""
 
     name: str
     point: Array
@@ -160,7 +163,7 @@ def _axes_of_joints(robot: Robot, name: str, point_of: Mapping[str, str], place:
 
 
 def _in_bores(keys: dict[str, Any], part: Path, joints: Mapping[str, JointAxis], length: float) -> list[str]:
-    """Make bores the interfaces of joints that the link file itself has no table for; what to say of them."""
+    """Make bores the interfaces of joints without a table in the link file; returns remarks."""
     tables = [table for table in keys.get("interface", ()) if isinstance(table, dict)]
     own = {
         table.get("name")
@@ -177,15 +180,15 @@ def _in_bores(keys: dict[str, Any], part: Path, joints: Mapping[str, JointAxis],
 
 PARALLEL = 1e-4  # 1 − cosine between the axes of a bore and of its joint
 CONCENTRIC = 0.05  # of the radius: how far the joint may be from the axis of the bore
-CENTERED = 1e-6  # of the length: how far the center of the bore is from the joint without a remark
+CENTERED = 1e-6  # of the length: distance of a bore's center from its joint without a remark
 
 
 def _bores_at(
     geometry: Mapping[str, Any], part: Path, joints: Mapping[str, JointAxis], length: float
 ) -> Iterator[tuple[dict[str, Any], str]]:
-    """A table `interface` and a remark for each of `joints`, by the interface's name, that a bore of `part` is around.
+    """A table `interface` with the nearest bore of `part`, and a remark, for each of `joints` (by interface) in one.
 
-    `geometry` says how the part stands in the link's axes. Of several bores the one nearest to the joint is taken.
+    `geometry`: pose of the part in the link's axes.
     """
     meters = geometry.get("unit", "m")
     faces = inspect_part(part, meters).faces

@@ -1,4 +1,4 @@
-"""`ffrobot import ROBOT.urdf -o DIR`: from a URDF to a scene in space, with link files of flexible links."""
+"""`ffrobot import ROBOT.urdf -o DIR`: from a URDF to a 3D scene, with link files of flexible links."""
 
 import os
 from collections.abc import Iterator, Mapping
@@ -23,11 +23,10 @@ SAME = 1e-9  # relative: less is round-off
 
 
 def _in_place_of(robot: Robot, link: ImportedLink, *, keep_rest: bool) -> tuple[dict[str, Any] | None, list[str]]:
-    """Payload that makes up for the difference to the <inertial> of the URDF, where it is to be kept; and remarks.
+    """Payload with the mass in excess of the flexible link, if it is to be kept; and remarks.
 
-    Its `point` is without its body. It is what the URDF has beyond the flexible link: mass m − m', first moment
-    mc − m'c', and the inertia about the frame less that of the link, taken to the center of the rest; axes of the link
-    file.
+    Its `point` is without its body. It has mass m − m', first moment mc − m'c', and the difference of the inertias
+    about the frame, taken to its center of mass; axes of the link file.
     """
     body = from_modal_body(link.name, cached_modal_body(link.table).body)
     inertial = robot.links[link.name].inertial
@@ -68,7 +67,7 @@ SHORTEST = 1e-3  # m, the whole robot
 # Radius of gyration over the robot's reach. Links of the robots of example-robot-data lie between 2e-3 and 0.6;
 # kg·cm² in place of kg·m² is a factor of 100, kg·mm² of 1000.
 WIDEST, NARROWEST = 3.0, 1e-4
-FAR, APART = 2.0, 10.0  # a center of mass from its frame: times the way to the next joints, and the radius of gyration
+FAR, APART = 2.0, 10.0  # center of mass from its frame: times the distance of joints, and the radius of gyration
 TURNS = 4 * np.pi  # rad: limits of joints that turn are within; a full turn in degrees is 360
 
 
@@ -125,13 +124,13 @@ TO_BE_APPENDED = """\
 
 @struct
 class Imported:
-    """Result of an import."""
+    """Result of an import of a URDF."""
 
     robot: Robot  # as read
     scene: Mapping[str, Any]  # keys of the scene file
-    remarks: tuple[str, ...]  # on what is left out, renamed or odd, a line each
-    masses: list[tuple[str, ...]]  # what meshes say: cells of `MASSES`
-    files: tuple[Path, ...]  # all that were written
+    remarks: tuple[str, ...]  # on losses, new names and oddities, a line each
+    masses: list[tuple[str, ...]]  # table of masses by meshes, with the columns `MASSES`
+    files: tuple[Path, ...]  # written
 
 
 def import_urdf(
@@ -147,16 +146,16 @@ def import_urdf(
     """Write DIR/scene.toml, and a link file for each link of `flexible`.
 
     Args:
-        urdf: the robot.
+        urdf: the URDF file.
         folder: DIR.
-        flexible: link files by link.
-        force: replace files that are there.
-        fix_inertia: see `SceneOfRobot`.
-        filling: fills the shapes of links without mass; None leaves them massless.
-        keep_rest: what a link of the URDF weighs beyond its flexible link becomes a payload on that one.
+        flexible: link files by names of links.
+        force: whether to replace existing files.
+        fix_inertia: whether to correct impossible inertias, see `least_change`.
+        filling: material of the shapes of links without mass; None leaves them massless.
+        keep_rest: whether the mass of a URDF's link in excess of its flexible link becomes a payload of that link.
 
     Raises:
-        InputError: wrong input, or files that would be replaced without `force`.
+        InputError: wrong input, or existing files without `force`.
         SolveError: a file cannot be written.
     """
     with of_file(urdf):

@@ -1,7 +1,4 @@
-"""What a URDF says of a robot (wiki.ros.org/urdf/XML), and how it is read: nothing merged, nothing left out. SI units.
-
-Messages name file, element, what was expected and found.
-"""
+"""URDF robot descriptions (wiki.ros.org/urdf/XML) as records, nothing merged or left out; SI units."""
 
 from __future__ import annotations
 
@@ -55,7 +52,7 @@ class Origin:
 
 @struct
 class Place:
-    """A frame in another: its origin d (3,) in m and its axes C (3, 3), columns, both in axes of the other."""
+    """Pose of a frame in another: origin d (3,), m, and axes C (3, 3), columns, both in axes of the other."""
 
     d: Array
     C: Array
@@ -70,7 +67,7 @@ HERE = Place(np.zeros(3), np.eye(3))
 
 @struct
 class Inertial:
-    """Mass (kg), center (3,) in m and inertia about it (3, 3) in kg·m², in axes of the link."""
+    """Mass (kg), center of mass (3,) in m and inertia (3, 3) about it in kg·m², in axes of the link."""
 
     mass: float
     center: Array
@@ -94,7 +91,7 @@ MASSLESS = Inertial(0.0, np.zeros(3), np.zeros((3, 3)))
 
 
 def inertial_of(body: Body, anchor: Array) -> Inertial:
-    """Return mass properties of the undeformed body with attached masses, in the link's frame at `anchor` (3,), m."""
+    """Return mass properties of an undeformed body with its attached masses; `anchor` (3,), m: the link's origin."""
     center = body.first_moment / body.mass
     J: Array = body.inertia - point_inertia(body.mass, center)
     return Inertial(body.mass, center - anchor, (J + J.T) / 2)
@@ -102,7 +99,7 @@ def inertial_of(body: Body, anchor: Array) -> Inertial:
 
 @struct
 class MeshFile:
-    """A mesh that a link shows: its file as the URDF names it, factors along its axes, place in the link."""
+    """A mesh of a link: its file as the URDF names it, factors along its axes, and its pose in the link."""
 
     filename: str
     scale: Numbers3
@@ -126,7 +123,7 @@ class Primitive:
 
 @struct
 class UrdfLink:
-    """A link: its mass and inertia (None: the URDF has none), and its shapes, to be seen and for collisions."""
+    """A link: mass and inertia (None if the URDF has none), and shapes for pictures and for collisions."""
 
     name: str
     inertial: Inertial | None
@@ -136,7 +133,7 @@ class UrdfLink:
 
 @struct
 class Mimic:
-    """The coordinate is `multiplier` times that of the joint, plus `offset`."""
+    """A coordinate is `multiplier` times that of another `joint`, plus `offset` (rad or m)."""
 
     joint: str
     multiplier: float
@@ -145,10 +142,10 @@ class Mimic:
 
 @struct
 class UrdfJoint:
-    """Joint of a URDF; `origin`: pose of the child's frame in the parent's at coordinate zero.
+    """Joint of a URDF; `origin`: pose of the child link's frame in the parent's at coordinate zero.
 
-    `axis` is in axes of the child. `limits` are those attributes of <limit> that are there (lower, upper, effort,
-    velocity), `dynamics` those of <dynamics> (damping, friction).
+    `axis` is in axes of the child. `limits` has the given ones of lower, upper, effort, velocity; `dynamics` those of
+    damping, friction; SI units.
     """
 
     name: str
@@ -163,18 +160,18 @@ class UrdfJoint:
 
     @property
     def label(self) -> str:
-        """Its name, for messages."""
+        """Text for messages: `joint "NAME"`."""
         return f'joint "{shown(self.name)}"'
 
     @property
     def way(self) -> float:
-        """Distance from the frame of its parent, m."""
+        """Distance of the joint from the origin of its parent link, m."""
         return float(np.linalg.norm(self.origin.xyz))
 
 
 @struct
 class Robot:
-    """Links and joints by name in the order of the file, the `root` that no joint carries, remarks on the file."""
+    """Links and joints by name in the order of the file, the name of the `root` link, remarks on the file."""
 
     name: str
     links: Mapping[str, UrdfLink]
@@ -191,7 +188,7 @@ FORBIDDEN = str.maketrans({"/": "_", ".": "_"})
 
 
 class Names:
-    """Unique names in one list: the same for the same original, valid by `common.keys.check_name`."""
+    """Valid, unique names for a scene: `names[original]` is always the same; none is in `taken`."""
 
     def __init__(self, taken: Iterable[str] = ()) -> None:
         self._taken = set(taken)
@@ -210,7 +207,7 @@ class Names:
 
     @property
     def changed(self) -> dict[str, str]:
-        """The new name of each original that could not stay."""
+        """New names of the originals that were invalid or not unique."""
         return {original: name for original, name in self._of.items() if original != name}
 
 
@@ -234,15 +231,15 @@ READ: Mapping[str, Container[str]] = {
     "dynamics": {"damping", "friction"},
     "mimic": {"joint", "multiplier", "offset"},
 }
-"""Attributes that are read, by element; of elements that are not here the import leaves out all."""
+"""Attributes that are read, by element; the import leaves out other elements."""
 SHAPES = ("visual", "collision", "material")  # for the eye, or read as far as masses and pictures need them
 
 
 def read_urdf(path: Path) -> Robot:
-    """The robot in the URDF file at `path`.
+    """Read the robot in the URDF file at `path`.
 
     Raises:
-        InputError: it cannot be read, is no URDF, an element or number is missing or wrong, links do not form one tree.
+        InputError: the file is no URDF, lacks elements or numbers or has wrong ones, or links form no single tree.
     """
     with naming(path):
         root = _root_element(read_bytes(path, "URDF file"))
@@ -262,7 +259,7 @@ def read_urdf(path: Path) -> Robot:
 def _root_element(content: bytes) -> Element:
     declared = _ENCODING.match(content)  # not in UTF-16, which expat knows
     builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate("utf-8" if declared else None)
-    # Prefixes stay as they are: published files use some (drake:, gazebo:) that they do not declare.
+    # Published files have undeclared prefixes (drake:, gazebo:).
     parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
     parser.CharacterDataHandler = builder.data
     try:
@@ -288,10 +285,7 @@ def _root_element(content: bytes) -> Element:
 
 
 def _odd(root: Element) -> Iterable[str]:
-    """Remarks on angles of more than a turn, degrees as a rule, and on elements that count once but are there twice.
-
-    Of these urdfdom takes the first, too.
-    """
+    """Remarks on angles of more than a turn, and on repeated elements, of which the first counts, as in urdfdom."""
     for each in (*root.findall("link"), *root.findall("joint")):
         turned = each.find("inertial") if each.tag == "link" else each
         rpy = (0.0, 0.0, 0.0) if turned is None else _origin(turned, each.tag).rpy
@@ -306,7 +300,7 @@ def _odd(root: Element) -> Iterable[str]:
 
 
 def _not_read(root: Element) -> Iterator[str]:
-    """Remarks on elements and attributes that have no place in a scene; on alike ones of several links one remark."""
+    """Remarks on elements and attributes that scenes lack, one for alike ones of several links."""
     known = {child.get("name", "") for child in root if child.tag in ("link", "joint")}
     beside = [child for child in root if child.tag not in (*READ, *SHAPES)]
     for tag, count in Counter(child.tag for child in beside).items():
@@ -331,7 +325,7 @@ def _listed(names: Iterable[str]) -> str:
 
 
 def _left_of(element: Element) -> Iterator[tuple[tuple[str, ...], str]]:
-    """What is not read of an element and of those inside it: of which kind, and as it stands there."""
+    """Kind and text of parts of an element that are not read."""
     # The other product of inertia of two counts only where it has another value.
     twin = {key: element.get(f"i{key[2]}{key[1]}") for key in ("iyx", "izx", "izy") if element.tag == "inertia"}
     left = {
@@ -358,7 +352,7 @@ SIZES: Mapping[Shape, Mapping[str, int]] = {
     "capsule": {"radius": 1, "length": 1},
     "sphere": {"radius": 1},
 }
-"""Attributes of shapes with so many numbers each."""
+"""Attributes of shapes, with their count of numbers."""
 
 
 def _text(element: Element, key: str, label: str, default: str = "") -> str:

@@ -1,4 +1,4 @@
-"""From a URDF to a scene in space: links that fixed joints hold together are one body, the root stands still."""
+"""From a URDF to a 3D scene: links that fixed joints connect are one body, the root is the ground."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -31,17 +31,17 @@ from .robot import (
 
 @dataclass(eq=False)
 class MergedLinks:
-    """Links that move as one: `top` carries the others; the body has its axes, unless it is flexible."""
+    """Links that are one body of the scene, which has the axes of the link `top`, or of its link file if flexible."""
 
-    top: str  # name of the link
+    top: str  # name of the link that carries the others
     stands_still: bool = False  # whether it is the ground
-    flexible: bool = False  # whether a link file says what it is; then it has no other member
-    members: dict[str, Place] = field(default_factory=dict)  # links, and where they stand in the body's axes
-    inertial: Inertial = MASSLESS  # of all of them
+    flexible: bool = False  # whether a link file describes it; then it has no other member
+    members: dict[str, Place] = field(default_factory=dict)  # poses of links in the body's axes
+    inertial: Inertial = MASSLESS  # of all members
 
     @property
     def weighs(self) -> bool:
-        """Whether it has mass."""
+        """Whether the body has mass."""
         return self.flexible or self.inertial.mass > 0
 
     @property
@@ -54,9 +54,9 @@ class MergedLinks:
 def _mechanism(
     robot: Robot, flexible: Mapping[str, Place], fix_inertia: bool
 ) -> tuple[list[MergedLinks], list[UrdfJoint], dict[str, MergedLinks], list[str]]:
-    """Bodies in the order in which joints carry them, these joints, the body of each link, and what was left out.
+    """Bodies in the order in which joints carry them, these joints, the body of each link, and remarks on losses.
 
-    `flexible` has the links that shall be flexible, and where their URDF frame stands in the axes of the link file.
+    `flexible`: poses of the URDF frames of flexible links in axes of their link files.
     """
     ground = MergedLinks(robot.root, stands_still=True)
     bodies, joints, body_of = [ground], list[UrdfJoint](), dict[str, MergedLinks]()
@@ -93,7 +93,7 @@ def _mechanism(
 def _with_mass(
     robot: Robot, bodies: list[MergedLinks], joints: list[UrdfJoint], body_of: Mapping[str, MergedLinks]
 ) -> tuple[list[MergedLinks], list[UrdfJoint], list[str]]:
-    """Without bodies beyond which nothing has mass: frames of tools and sensors on joints of their own."""
+    """Bodies and joints without those beyond which nothing has mass: frames of tools and sensors."""
     below = {body for body in bodies if body.weighs}
     for joint in reversed(joints):
         if body_of[joint.child] in below:
@@ -122,10 +122,10 @@ def _with_mass(
 
 
 def least_change(inertia: Array) -> Array:
-    """Return the inertia (3, 3), kg·m², nearest to `inertia` by Frobenius, of which no principal moment is too large.
+    """Return the inertia (3, 3), kg·m², nearest to `inertia` (Frobenius norm) with principal moments J₃ ≤ J₁ + J₂.
 
-    Principal axes stay. With d = J₃ − J₁ − J₂ > 0 it is the projection on the plane J₃ = J₁ + J₂: J₁ + d/3, J₂ + d/3,
-    J₃ − d/3. Moments that are not positive stay so, unless d/3 makes them.
+    Principal axes stay. With d = J₃ − J₁ − J₂ > 0 the moments become J₁ + d/3, J₂ + d/3, J₃ − d/3. Negative ones may
+    stay negative.
     """
     moments, axes = np.linalg.eigh((inertia + inertia.T) / 2)
     excess = max(moments[2] - moments[0] - moments[1], 0.0)
@@ -152,7 +152,7 @@ def _fixed(bodies: list[MergedLinks]) -> list[str]:
 
 
 def is_possible(inertia: Array) -> bool:
-    """Tell whether no principal moment of an inertia (3, 3), kg·m², exceeds the sum of the others beyond round-off."""
+    """Whether no principal moment of an inertia (3, 3), kg·m², exceeds the sum of the others beyond round-off."""
     moments = np.linalg.eigvalsh(inertia)
     return bool(moments[2] <= moments[0] + moments[1] + ROUND_OFF * np.abs(inertia).max())
 
@@ -179,13 +179,13 @@ ORIGIN = "origin"  # point of a rigid body where the joint that carries it is
 
 
 class SceneOfRobot:
-    """Scene made from a URDF: `keys` of the file, and `remarks` on what it could not keep.
+    """Scene made from a URDF: `keys` of the file, and `remarks` on losses.
 
-    `meshes` are files from the folder of the scene on, by the names that the URDF has for them. By `fix_inertia`
-    principal moments that no body has are changed, as little as can be: see `least_change`.
+    `flexible`: flexible links by name. `meshes`: files relative to the folder of the scene, by their names in the
+    URDF. `fix_inertia`: whether to correct impossible inertias by `least_change`.
 
     Raises:
-        InputError: a body that moves has no mass but carries others, or an inertia that no body has.
+        InputError: a moving body has no mass but carries others, or has an impossible inertia.
     """
 
     def __init__(
@@ -239,7 +239,7 @@ class SceneOfRobot:
         return {"name": name, "rigid": rigid}
 
     def _tools(self, body: MergedLinks) -> list[str]:
-        """Links of a rigid body that carries no other: its frames with axes of their own, ends of fixed joints."""
+        """Links at ends of fixed joints of a rigid body that carries no other: frames with other axes."""
         carries = any(self.body_of[joint.parent] is body for joint in self.carrying)
         if carries or body.flexible or body.stands_still:
             return []

@@ -1,4 +1,4 @@
-"""Shapes and meshes of links: masses of links without <inertial> by one density, and what meshes say of masses."""
+"""Shapes and meshes of links: masses of links without <inertial> by a density, and comparison of others."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ NOT_LOOKED_AT = "meshes were not read, which needs trimesh: pip install trimesh 
 
 
 MASSES = "link", "mesh", "mass kg", "volume m³", "implied kg/m³", "inertia: mesh / URDF", "centers apart m"
-"""What tables compare of filled meshes and <inertial>; inertia: traces about the centers; implied: density."""
+"""Columns that compare filled meshes with <inertial>; inertia: traces about the centers; implied: density."""
 
 
 def mesh_masses(robot: Robot, urdf: Path) -> tuple[list[tuple[str, ...]], list[str]]:
-    """Cells of `MASSES` for all links that have meshes and <inertial>; second, remarks, a line each."""
+    """Return rows of a table with columns `MASSES` for links with meshes and <inertial>; and remarks, a line each."""
     try:
         import trimesh
     except ModuleNotFoundError:
@@ -71,7 +71,7 @@ def mesh_masses(robot: Robot, urdf: Path) -> tuple[list[tuple[str, ...]], list[s
 
 
 def mesh_path(filename: str, urdf: Path) -> Path | None:
-    """Find the file of a mesh; `package://NAME/…` is searched beside and above the URDF. None if missing."""
+    """Find the file of a mesh; `package://NAME/…` is searched next to and above the URDF file. None if missing."""
     kind, _, rest = filename.rpartition("://")
     folders = urdf.absolute().parents
     if kind != "package":
@@ -91,7 +91,7 @@ def _loaded(mesh: MeshFile, urdf: Path) -> trimesh.Trimesh:
 
 
 def _is_closed(mesh: trimesh.Trimesh) -> bool:
-    """Whether the facets enclose a volume, all with the same side out: otherwise their integrals are wrong."""
+    """Whether the facets enclose a volume, all with the same side out: else integrals are wrong."""
     return bool(mesh.is_watertight and mesh.is_winding_consistent)
 
 
@@ -100,9 +100,9 @@ ALIKE = 1e-9  # sections whose sizes differ by less, relative, are one shape
 
 
 def beam_visuals(body: ModalBody, anchor: Array) -> Iterator[Primitive]:
-    """Yield the undeformed beam by the outer sizes of its sections, a shape for each length with the same ones.
+    """Yield boxes or cylinders that show an undeformed beam, one for each length of constant section.
 
-    `anchor` (3,), m, is where the link's frame is, in axes of the body. Round are outlines of more than four corners.
+    `anchor` (3,), m: the link's origin in axes of the body. Outlines with more than four corners become cylinders.
     """
     stations = body.stations
     height = stations.height
@@ -121,7 +121,7 @@ def beam_visuals(body: ModalBody, anchor: Array) -> Iterator[Primitive]:
 
 
 def bars(points: Sequence[Array], radius: float) -> Iterator[Primitive]:
-    """Yield cylinders from the link's frame to `points` (3,), m, in its axes; one sphere if all coincide with it."""
+    """Yield cylinders of `radius` (m) from the link's origin to `points` (3,), m; a sphere if all coincide with it."""
     away = [point for point in points if np.any(point)]
     for point in away:
         rpy = rpy_of(smallest_turn(point))
@@ -139,10 +139,10 @@ class Filling:
 
 
 def with_masses(robot: Robot, urdf: Path, filling: Filling) -> tuple[Robot, list[str]]:
-    """The robot with masses for the links that have none but have shapes, and a remark on each of these links.
+    """Return the robot with masses of links that lack them, by `filling` of their shapes; and a remark on each.
 
-    Shapes for collisions come before those to be seen: they are closed and simple as a rule. The root stands still and
-    needs no mass.
+    Collision shapes are preferred, as they are usually closed and simple. The root is fixed and needs no mass. Raises
+    `InputError` for unreadable meshes and shapes without a volume.
     """
     links, remarks = dict[str, UrdfLink](robot.links), list[str]()
     for name, link in robot.links.items():
@@ -156,7 +156,7 @@ def with_masses(robot: Robot, urdf: Path, filling: Filling) -> tuple[Robot, list
 
 
 def without_mass(robot: Robot) -> list[str]:
-    """A remark on each link that has shapes but no mass, and moves."""
+    """Return a remark on each link with shapes but without mass, except the root."""
     return [
         f'link "{shown(name)}" has shapes but no mass: --density estimates it from them'
         for name, link in robot.links.items()
@@ -165,7 +165,7 @@ def without_mass(robot: Robot) -> list[str]:
 
 
 def _filled(robot: Robot, link: UrdfLink, urdf: Path, filling: Filling) -> tuple[Inertial | None, str]:
-    """Mass and inertia of a link, and what they are made of; None where nothing says how large the link is."""
+    """Mass and inertia of a link, and their source in words; None where its size is unknown."""
     with_density = f"with {filling.density:g} kg/m³"
     for kind, shapes in (("collision", link.collision), ("visual", link.visual)):
         meshes = [shape for shape in shapes if isinstance(shape, MeshFile)]
@@ -193,10 +193,7 @@ def _filled(robot: Robot, link: UrdfLink, urdf: Path, filling: Filling) -> tuple
 
 
 def _of_primitive(shape: Primitive, density: float) -> Inertial:
-    """Solid box, cylinder, capsule or sphere.
-
-    The half spheres of a capsule have their centers 3/8 of the radius beyond the ends of its cylinder.
-    """
+    """Solid box, cylinder, capsule (centers of half spheres 3/8 radius beyond its cylinder) or sphere."""
     moments: Array
     if shape.shape == "box":
         x, y, z = shape.size
