@@ -1,4 +1,4 @@
-"""Covariance of fitted parameters in a file, and deviations of stable depths of cut over a map by it."""
+"""Covariance of fitted parameters in a file, and resulting deviations of stable depths of cut over a map."""
 
 from contextlib import suppress
 from dataclasses import replace
@@ -47,7 +47,7 @@ class Covariance(Record):
 
     @property
     def steps(self) -> Array:
-        """Independent changes (k, n) of ln θ of one standard deviation each: Σ step stepᵀ is the covariance."""
+        """Rows (n, n), no unit: independent changes of ln θ of n parameters θ, whose covariance is Σ rowᵀ row."""
         values, vectors = np.linalg.eigh(np.array(self.correlation))
         if values[0] < -1e-9 * len(values):
             raise InputError("correlation: expected one without negative eigenvalues", "others")
@@ -70,10 +70,10 @@ def read_covariance(path: Path) -> Covariance:
 
 
 def with_deviations(poses: PoseMap, covariance: Covariance) -> PoseMap:
-    """Return the map of stable depths with `milling_deviation` (P,), m: standard deviations of `milling_depth`.
+    """Return a map of P poses with `milling_deviation` (P,), m: standard deviations of `milling_depth`.
 
-    σ² = Σ ((a₊ − a₋)/2)² over independent changes of one standard deviation of the parameters to both sides; NaN where
-    a changed robot has no equilibrium, or no limit. Raises `InputError` for keys that the scene has not.
+    σ² = Σ ((a₊ − a₋)/2)² of depths a with parameters changed by ± each of `covariance.steps`; NaN where a changed
+    robot has no equilibrium, or no limit. Raises `InputError` for keys that the scene has not.
     """
     target = RobotTarget(poses.plan.scene, "locked")
     varied, variances = VariedKeys(poses.plan.scene, target, covariance.keys, None), dict[str, Array]()
@@ -87,7 +87,7 @@ def with_deviations(poses: PoseMap, covariance: Covariance) -> PoseMap:
 
 
 def _depths(poses: PoseMap, target: RobotTarget, varied: VariedKeys, values: Array) -> dict[str, Array]:
-    """Stable depths (P,) in all poses with other values of the parameters, by name; NaN where there are none."""
+    """Stable depths (P,), m, in all poses with other values of the parameters, by name; NaN without one."""
     with varied.named(values):
         model = prepare_scene(target.scene(varied.changes(values), "static")).model
     depths = {name: np.full(len(poses.q), np.nan) for name in poses.values if name.endswith("/milling_depth")}

@@ -40,8 +40,8 @@ VALUE = r'("[^"\n]*"|[^\s,}\]#]+)'  # a text or a number
 def with_values(text: str, changes: Mapping[Key, float | str]) -> str:
     """Return the TOML `text` with other values of keys that are in it.
 
-    A value is replaced where it stands, which parsing the result confirms; where there is no such place, as of an entry
-    of a list, the tables are written anew, without comments.
+    Values are replaced in place, which parsing the result confirms; where that is impossible, as in lists, the tables
+    are written anew, without comments.
     """
     for key, value in changes.items():
         wanted = deepcopy(tomllib.loads(text))
@@ -104,7 +104,7 @@ class RobotTarget:
     def scene(self, changes: Mapping[Key, float], kind: str, initial: Mapping[str, object] | None = None) -> Scene:
         """Return the scene with some values changed, one analysis of a `kind`, and other entries of [initial].
 
-        Raises `InputError` for values that it does not allow.
+        Raises `InputError` for impossible values.
         """
         files = run_files(self._path, changes, self._path.parent)
         scene = files.scene | {"analysis": [{"name": "fit", "kind": kind}]}
@@ -119,7 +119,7 @@ class RobotTarget:
         return make_scene(folder=self._path.parent, **scene)
 
     def modes(self, changes: dict[Key, float]) -> tuple[tuple[str, ...], Array]:
-        """Return frequencies (k,), Hz, of the robot's vibrations, the lowest first, by other values; no families."""
+        """Return empty families and frequencies (k,), Hz, of k vibrations, lowest first, with some values changed."""
         solution = solve_scene(self.scene(changes, "linear"), Watcher())
         details = solution.outcomes["fit"].details
         assert isinstance(details, LinearModels)

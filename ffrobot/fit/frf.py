@@ -1,8 +1,8 @@
 """`ffrobot fit --frf`: keys of a scene fitted to frequency response functions in one or several poses.
 
-Residuals are ln(H/H_measured)/σ of each line, the logarithm of the magnitude and the phase (rad). The equations of the
-robot are taken as linear in the parameters θ from one place to the next, where they are made anew: they are linear in
-stiffness, damping and masses but for what gravity adds, so that a few places are enough.
+Residuals are ln(H/H_measured)/σ at each frequency: logarithm of the magnitude, and phase (rad). The equations of motion
+are linearized in the parameters θ, and linearized again at the optimum: except for effects of gravity they are linear
+in stiffness, damping and masses, so that a few iterations suffice.
 
 With Z = K + iωD − ω²M and rows J of the points' displacements, the receptance is H = J_r Z⁻¹ J_fᵀ, and
 
@@ -108,16 +108,19 @@ def _start(tests: Path, target: RobotTarget, pose: MeasuredPose) -> Initial | No
 
 
 Equations = Callable[[Array], Sequence[Array]]
-"""`stacked` equations of all poses by the values (n,) of parameters, in the same coordinates for all of these."""
+"""Function of the parameters (n,) that returns `stacked` equations of all poses, always in the same coordinates."""
 
 
 def stacked(M: Array, K: Array, D: Array, J: Array) -> Array:
-    """Return one array (3 f + r, f) of M, K, D (f, f), SI units, and rows J (r, f) of `MeasuredPose.ends`."""
+    """Return one array (3 f + r, f) of M, K, D (f, f) and J (r, f), displacements per coordinate; SI units.
+
+    f free coordinates; J has a row for each of the r directions of `MeasuredPose.ends`.
+    """
     return np.vstack([M, K, D, J])
 
 
 def unstacked(equations: Array) -> list[Array]:
-    """Return M, K, D (f, f) and J (r, f) of `stacked` equations."""
+    """Return M, K, D (f, f) and J (r, f), SI units, of `stacked` equations (3 f + r, f)."""
     f = equations.shape[1]
     return np.split(equations, [f, 2 * f, 3 * f])
 
@@ -125,7 +128,10 @@ def unstacked(equations: Array) -> list[Array]:
 def receptance(
     equations: Array, pose: MeasuredPose, changes: Sequence[Array] = ()
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Return H (F, p), m/N, where a pose was measured, and its derivatives (n, F, p) along `changes` of `equations`."""
+    """Return receptances H (F, p), m/N, of the p FRFs of a pose at its F frequencies, and derivatives (n, F, p).
+
+    Derivatives are along n `changes` of `stacked` `equations`.
+    """
     (M, K, D, J), f, r = unstacked(equations), pose.ends.force, pose.ends.response
     X, w = vibration(M, K, D, J, pose.omega), pose.omega[:, None, None]
     H: ComplexArray = np.asarray((J @ X)[:, r, f], dtype=complex)
@@ -150,7 +156,7 @@ class PoseModel:
         self._rest: Array | None = None  # the first equilibrium
 
     def at(self, robot: Solution) -> Array:
-        """Return the `stacked` equations (3 f + r, f) about the equilibrium, SI units.
+        """Return the `stacked` equations (3 f + r, f) of a prepared robot about its equilibrium in the pose, SI units.
 
         Raises `InputError` for unknown points, `SolveError` without an equilibrium.
         """
@@ -171,18 +177,18 @@ class PoseModel:
 
 
 STEP = 1e-4  # relative, for derivatives of the equations
-LINEAR = 1e-3  # relative: where the equations are off by more, their derivatives are made anew
+LINEAR = 1e-3  # relative error of the linearized equations, from which they are linearized again
 REACHED = 1e-9  # of ln θ: a last step
 MOST_PLACES = 30
-NO_EFFECT = 1e-9  # of a parameter at the start, against the largest: small damping has little there
+NO_EFFECT = 1e-9  # of a parameter at the start, against the largest: small damping has little effect
 NO_MOTION = 1e-12  # of a measured FRF: the model has none
 STANDS_OUT = float(np.log(2.0))  # of peaks, in the logarithm of the magnitude
-SMOOTH = (0.3, 0.1, 0.03)  # of ln f: widths over which magnitudes are first compared, so that peaks find each other
+SMOOTH = (0.3, 0.1, 0.03)  # of ln f: widths of first comparisons of magnitudes, which bring peaks together
 
 
 @dataclass(frozen=True)
 class PoseComparison:
-    """The FRFs (F, p) of a pose, m/N: measured, at the start, and fitted."""
+    """The p FRFs of a pose at F frequencies, (F, p), m/N: measured, `before` and `after` the fit."""
 
     pose: MeasuredPose
     before: ComplexArray
@@ -190,14 +196,14 @@ class PoseComparison:
 
     @property
     def frac(self) -> Array:
-        """Frequency response assurance criteria (p,), 1 of equal shapes (Heylen and Avitabile, IMAC 1998)."""
+        """Frequency response assurance criteria (p,), no unit, 1 for equal shapes (Heylen and Avitabile, IMAC 1998)."""
         a, b = self.pose.receptance, self.after
         across = np.abs((a.conj() * b).sum(axis=0)) ** 2
         return across / ((np.abs(a) ** 2).sum(axis=0) * (np.abs(b) ** 2).sum(axis=0))
 
     @property
     def frequency_error(self) -> Array:
-        """Relative errors (k,) of the frequencies of the k peaks of the measured sum of magnitudes."""
+        """Relative errors (k,) of the fitted frequencies of the k peaks of the measured sum of magnitudes."""
         measured = _peaks(self.pose.frequency, self.pose.receptance, STANDS_OUT)
         fitted = _peaks(self.pose.frequency, self.after, 0.1 * STANDS_OUT)
         if not len(fitted):
@@ -210,7 +216,7 @@ class PoseComparison:
         return float(np.sqrt(np.mean(np.abs(np.log(self.after / self.pose.receptance)) ** 2)))
 
     def row(self) -> tuple[str, ...]:
-        """Return cells below `HEADING`."""
+        """Return the table row: test, use, number of FRFs, least and mean FRAC, error of peaks, misfit."""
         errors, frac = self.frequency_error, self.frac
         peaks = f"{100 * errors[np.abs(errors).argmax()]:+.2f} % of {len(errors)}" if len(errors) else "none"
         use = "validation" if self.pose.test.validation else "fit"
@@ -229,7 +235,7 @@ def _peaks(frequency: Array, H: ComplexArray, prominence: float) -> Array:
 
 @dataclass(frozen=True, kw_only=True)
 class ResponseFit(Parameters):
-    """Parameters fitted to FRFs, and these in all poses."""
+    """Parameters fitted to FRFs, and a comparison of the FRFs in each pose."""
 
     poses: tuple[PoseComparison, ...]
 
@@ -306,7 +312,10 @@ class _Residuals:
 
 
 def differentiated(equations: Equations, values: Array, place: Sequence[Array]) -> list[list[Array]]:
-    """Return ∂/∂θ of the equations by pose and parameter at `values` (n,), from those in `place`: exact if linear."""
+    """Return forward differences of `stacked` equations by pose and parameter, per unit of the parameter.
+
+    `place`: the equations of all poses at the parameters' `values` (n,).
+    """
     found = []
     for step in np.diag(STEP * values):
         pairs = zip(equations(values + step), place, strict=True)
@@ -330,9 +339,9 @@ def _receptances(equations: Sequence[Array], poses: Sequence[MeasuredPose]) -> l
 def fit_receptances(
     equations: Equations, keys: Sequence[str], start: Array, poses: Sequence[MeasuredPose]
 ) -> ResponseFit:
-    """Find the parameters (n,), from `start` on, whose FRFs come nearest to those measured in `poses`.
+    """Find the parameters, from `start` (n,) on, whose FRFs are nearest to those measured in `poses`.
 
-    `equations` has those of `poses`, in their order; poses for validation are only compared.
+    `equations` returns those of `poses`, in their order; poses for validation are only compared.
 
     Raises:
         InputError: all poses are for validation, or FRFs do not distinguish the parameters.

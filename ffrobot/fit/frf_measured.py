@@ -30,15 +30,15 @@ LABELS = {0: ("m",), 1: ("m/s",), 2: ("m/s^2", "m/s2", "m/s²", "m/s**2")}  # of
 
 
 class Column(NamedTuple):
-    """An FRF as a file has it, with texts of its ends, "POINT/-x"."""
+    """An FRF as a file has it: `values` (F,) at `frequency` (F,), Hz; points and directions as "POINT/-x"."""
 
     force: str
     response: str
     frequency: Array
     values: ComplexArray
     coherence: Array | None
-    order: int | None = None  # of the time derivative, where the file has it
-    is_si: bool = False
+    order: int | None = None  # of the time derivative: 0 receptance, 1 mobility, 2 accelerance
+    is_si: bool = False  # whether the file's label of units is SI's, or empty
 
 
 def read_columns(path: Path) -> list[Column]:
@@ -202,7 +202,7 @@ class Direction(NamedTuple):
 
 
 class Ends(NamedTuple):
-    """The directions of p FRFs, each once, and the indices (p,) of those of force and response among them."""
+    """The different directions in p FRFs, and the index among them of each FRF's force (p) and response (p)."""
 
     directions: list[Direction]
     force: list[int]
@@ -211,9 +211,9 @@ class Ends(NamedTuple):
 
 @struct
 class MeasuredPose:
-    """The FRFs of one test at `frequency` (F,), Hz; `deviation` (F, p): relative standard deviation, or a weight.
+    """The p FRFs of one test at `frequency` (F,), Hz: directions of `force` and `response` of each.
 
-    Receptances (F, p), m/N, of `response` by `force`, p each, and coherence (F, p), NaN where unknown.
+    `receptance` (F, p), m/N; `coherence` (F, p), no unit, NaN where unknown.
     """
 
     test: ResponseTest
@@ -230,21 +230,21 @@ class MeasuredPose:
 
     @cached_property
     def ends(self) -> Ends:
-        """Directions of forces and responses."""
+        """Directions of forces and responses, each once."""
         directions = list(dict.fromkeys((*self.force, *self.response)))
         force, response = ([directions.index(end) for end in ends] for ends in (self.force, self.response))
         return Ends(directions, force, response)
 
     @property
     def labels(self) -> list[str]:
-        """Texts (p) of the directions of force and response."""
+        """Texts of the p pairs of force and response."""
         return [f"{force.label} → {response.label}" for force, response in zip(self.force, self.response, strict=True)]
 
     @cached_property
     def deviation(self) -> Array:
-        """Standard deviation (F, p) of ln H, √((1 − γ²)/(2 n γ²)) (Bendat and Piersol, Random Data, 2010, 9.2).
+        """Standard deviation (F, p) of ln H by n averages and coherence γ², no unit; 1 where γ² is unknown.
 
-        1 where the coherence γ² is not known.
+        √((1 − γ²)/(2 n γ²)) (Bendat and Piersol, Random Data, 2010, 9.2).
         """
         averages = self.test.averages or 2
         spread = np.sqrt((1.0 - self.coherence) / (2.0 * averages * np.maximum(self.coherence, FLOOR)))

@@ -20,8 +20,8 @@ STEP = 1e-3  # of ln θ, on both sides: frequencies of finite elements are known
 NO_EFFECT = 1e-4  # of a parameter, or a combination, against the largest: differences have errors of 1e-6
 SHARE = 0.1  # of the largest: entries of a combination that are named
 MOST_EVALUATIONS = 100
-FEW = 30  # degrees of freedom below which two standard deviations are less than a range of 95 %
-ALIKE = 0.95  # correlation of two parameters' errors from which their values are hardly distinguished
+FEW = 30  # degrees of freedom below which 95 % is more than two standard deviations
+ALIKE = 0.95  # correlation of errors from which parameters are hardly distinguishable
 
 Frequencies = Callable[[Array], Array]
 """Frequencies (m,), Hz, of parameters (n,)."""
@@ -29,13 +29,13 @@ Frequencies = Callable[[Array], Array]
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(ABC):
-    """Fitted parameters, n.
+    """The n fitted parameters.
 
     Attributes:
         keys: names of the parameters.
-        start, value: (n,) before and after.
+        start, value: (n,) before and after the fit, in the units of the keys.
         relative_deviation: (n,) standard deviations of the parameters, relative to them; NaN where not known.
-        correlation: (n, n) of the parameters' errors; NaN where not known.
+        correlation: (n, n) of the parameters' errors, no unit; NaN where not known.
         files: the files written.
     """
 
@@ -53,7 +53,7 @@ class Parameters(ABC):
 
     @abstractmethod
     def comparison(self) -> tuple[Sequence[str], Iterator[Sequence[str]]]:
-        """Heading and rows of a table with what was measured and what the model has."""
+        """Heading and rows of a table that compares the measurement with the model."""
 
     def remarks(self) -> Iterator[str]:
         """Yield notes on the accuracy of the fit; here on pairs of parameters that are hardly distinguishable."""
@@ -67,7 +67,7 @@ class Parameters(ABC):
 
 @dataclass(frozen=True, kw_only=True)
 class Fit(Parameters):
-    """Parameters fitted to frequencies, and these before and after, m.
+    """Parameters fitted to m measured frequencies.
 
     Attributes:
         labels: (m) names of the modes.
@@ -87,9 +87,9 @@ class Fit(Parameters):
         return None if self.uncertainty is not None else len(self.measured) - len(self.keys)
 
     def coverage_factor(self, probability: float) -> float:
-        """Number of deviations on both sides of a fitted value in a confidence interval of this probability.
+        """Return the half width of a confidence interval of this probability, in standard deviations.
 
-        Student's t where the deviation is estimated from the remaining errors (JCGM 100:2008, G.3); NaN of none.
+        Student's t where the deviation is estimated from the remaining errors (JCGM 100:2008, G.3), or NaN.
         """
         freedom = self.degrees_of_freedom
         return float(scipy.stats.t.ppf(0.5 + 0.5 * probability, np.inf if freedom is None else freedom))
@@ -101,7 +101,7 @@ class Fit(Parameters):
 
     @property
     def misfit(self) -> float:
-        """√(χ²/(m − n)): remaining errors in terms of the uncertainties, about 1 of a right model; NaN without them."""
+        """√(χ²/(m − n)) of m frequencies and n parameters, about 1 for a right model; NaN without uncertainties."""
         spare = len(self.measured) - len(self.keys)
         if self.uncertainty is None or spare == 0:
             return np.nan
@@ -146,12 +146,12 @@ def fit_frequencies(
     measured: Array,
     uncertainty: Array | None = None,
 ) -> Fit:
-    """Find the parameters (n,), from `start` on, whose frequencies come nearest to the `measured` ones (m,), Hz.
+    """Find the parameters, from `start` (n,) on, whose frequencies are nearest to the `measured` ones (m,), Hz.
 
-    `uncertainty` (m,): standard deviations of these, Hz. `keys` and `labels` name parameters and modes.
+    `uncertainty` (m,): their standard deviations, Hz. `keys` and `labels` name parameters and modes.
 
     Raises:
-        InputError: fewer frequencies than parameters, or parameters that they cannot tell apart.
+        InputError: fewer frequencies than parameters, or parameters that they cannot distinguish.
         SolveError: the iteration does not converge.
     """
     if len(measured) < len(keys):
@@ -194,9 +194,9 @@ def fit_frequencies(
 def check_distinguishable(
     J: Array, keys: Sequence[str], measured: str = "frequencies", *, least: float = NO_EFFECT
 ) -> None:
-    """Raise `InputError` for parameters, or combinations of them, without effect: null vectors of J (m, n), m ≥ n.
+    """Raise `InputError` for parameters `keys`, or combinations, without effect on residuals: null vectors of J.
 
-    `least`: the smallest effect against the largest.
+    J (m, n), m ≥ n: derivatives by the logarithms of parameters, no unit. `least`: smallest relative effect.
     """
     _, values, V = np.linalg.svd(J, full_matrices=False)
     sizes = np.linalg.norm(J, axis=0)
@@ -217,9 +217,9 @@ def check_distinguishable(
 
 
 def uncertainty_of(J: Array, r: Array, *, known: bool) -> dict[str, Any]:
-    """Return the `relative_deviation` and `correlation` of `Parameters` by J (m, n) and residuals r (m,).
+    """Return the `relative_deviation` (n,) and `correlation` (n, n) of `Parameters`, no unit.
 
-    NaN for m = n without `known` uncertainties of the measured values.
+    By residuals r (m,) and their derivatives J (m, n); NaN for m = n without `known` measurement uncertainties.
     """
     m, n = J.shape
     inverse = np.linalg.inv(J.T @ J) if known or m > n else np.full((n, n), np.nan)
