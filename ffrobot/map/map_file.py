@@ -1,4 +1,4 @@
-"""The files of a map, map.h5 with all arrays over the grid, table.csv with a line for each pose; what is printed."""
+"""Files of a map: map.h5 with arrays over the grid, table.csv with a line for each pose; printed summary."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -95,9 +95,9 @@ def _columns(poses: PoseMap, name: str, values: Array) -> dict[str, Array]:
 
 
 def best_turns(poses: PoseMap) -> dict[str, tuple[Array, Array]]:
-    """Return, by condition, the tool's turn (rad) of the largest stable depth (m) at each place of the other axes.
+    """Return, by condition of joints, the tool's turn (rad) with the largest stable depth, and this depth (m).
 
-    NaN where no turn is possible; empty for grids without turns, and without milling.
+    Arrays over the axes of the grid except "turn"; NaN where no turn is possible. Empty without turns or milling.
     """
     plan = poses.plan
     if plan.turned_about is None:
@@ -112,14 +112,14 @@ def best_turns(poses: PoseMap) -> dict[str, tuple[Array, Array]]:
 
 
 CONDITIONS = {"compliant": "compliant gears", "locked": "joints locked"}
-ROUND_OFF = 1e-13  # of the reach: smaller deflections are round-off, of its power a smaller manipulability
+ROUND_OFF = 1e-13  # of the reach (deflections), or of its power (manipulability)
 CONSTANT = 1e-9  # of the largest value: differences of less are round-off
 
 
 class Quantity(NamedTuple):
-    """Values (P,) in the unit of the title, NaN where a pose is impossible; whether larger is better.
+    """Values (P,) in P poses in the unit of the title, NaN in impossible ones; whether larger is better.
 
-    `endless`: the word for infinite ones.
+    `endless`: the word for infinite values.
     """
 
     title: str
@@ -129,14 +129,14 @@ class Quantity(NamedTuple):
 
     @property
     def everywhere(self) -> str:
-        """The one value of all poses; empty where values differ, or none is known."""
+        """Text of the value of all poses; empty where values differ, or none is known."""
         known = self.values[~np.isnan(self.values)]
         if not known.size or not np.isfinite(known).any():
             return self.endless if known.size else ""
         return f"{known[0]:.4g}" if np.ptp(known) <= CONSTANT * np.abs(known).max() else ""
 
     def text(self, pose: int) -> str:
-        """Return the value of a pose as it is printed."""
+        """Return the value in pose number `pose` as text."""
         return f"{self.values[pose]:.4g}" if np.isfinite(self.values[pose]) else self.endless
 
     @property
@@ -183,7 +183,7 @@ def _beyond(round_off: float, values: Array) -> Array:
 
 
 def print_map(poses: PoseMap, console: Console) -> None:
-    """A table of quantities: the worst and the best value with the poses; then how many poses there are."""
+    """Print a table of quantities, with the worst and the best value and their poses, and numbers of poses."""
     console.out(f"{poses.plan.point} over {' and '.join(axis.name for axis in poses.plan.axes)}")
     print_table(console, ("quantity", "worst", "at", "best", "at"), _ranges(poses))
     for line in _milling(poses):
@@ -202,7 +202,7 @@ def _ranges(poses: PoseMap) -> Iterator[tuple[str, ...]]:
 
 
 def _milling(poses: PoseMap) -> Iterator[str]:
-    """What the smallest stable depth would be with another feed or another turn of the tool, and its deviation."""
+    """Smallest stable depth with other feeds or turns of the tool, and its deviation."""
     condition = next((f"joints_{one}" for one in CONDITIONS if f"joints_{one}/milling_depth" in poses.values), "")
     of = {name.partition("/")[2]: values for name, values in poses.values.items() if name.startswith(condition)}
     if not condition or not np.isfinite(of["milling_depth"]).any():

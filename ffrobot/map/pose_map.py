@@ -41,9 +41,9 @@ MOST_AXES = 3
 
 
 def parse_grid(texts: Sequence[str], scene: Scene) -> tuple[GridAxis, ...]:
-    """The axes of a grid over the joints of `scene`, or over x, y, z of a point.
+    """Return the axes of a grid over joints of `scene`, or over x, y, z of a point and turns of a tool.
 
-    Raises `InputError` where a text is no axis, and for joints and places that are mixed, unknown, or too many.
+    Raises `InputError` for other texts, and for joints and directions that are mixed, unknown, or too many.
     """
     axes = tuple(_axis(text, scene) for text in texts)
     names = [axis.name for axis in axes]
@@ -95,14 +95,14 @@ STATUS = ("found", "out of reach", "outside joint limits", "no equilibrium")
 
 @dataclass(frozen=True)
 class MapPlan:
-    """Request of a map of a scene over `axes`, in a folder.
+    """Settings of a map of a scene over the grid of `axes`, with its folder.
 
     Attributes:
-        point: "BODY.POINT" whose stiffness and place it has.
+        point: "BODY.POINT" whose stiffness is mapped, and whose positions a grid over x, y, z has.
         keeps_orientation: whether the body of the point keeps the orientation of the start.
-        count: natural frequencies of each pose.
-        frequencies: (F,) Hz of the frequency response.
-        milling: process whose stable depths it has.
+        count: number of natural frequencies in each pose.
+        frequencies: (F,) of the frequency response, Hz.
+        milling: process whose stable depths are mapped.
     """
 
     scene: Path
@@ -129,9 +129,10 @@ class MapPlan:
 
 @dataclass(frozen=True)
 class PoseMap:
-    """A map: `values` (P, …) by name, in units of `map_file.UNITS`, NaN where there is no pose or limit; `status` (P,).
+    """A map of P poses: `values` (P, …) by name, in units of `map_file.UNITS`, NaN without a pose or a limit.
 
-    `motors` have the unit "rad" or "m" of their coordinates in `units`, and `limits` (motors,), N·m or N. `q` (P, n_q).
+    `motors` have coordinates in `units`, "rad" or "m", and `limits` (motors,), N·m or N. `status` (P,): index in
+    `STATUS`. `q` (P, n_q): coordinates of the model, SI units.
     """
 
     plan: MapPlan
@@ -153,8 +154,9 @@ def plan_map(
     frequencies: Array | None = None,
     milling: Milling | None = None,
 ) -> MapPlan:
-    """Return the plan of a map with responses at `frequencies` (F,), Hz.
+    """Return the plan of a map with frequency responses at `frequencies` (F,), Hz; see `MapPlan`.
 
+    `over`: texts of the grid's axes. `orientation` "start" keeps that of the start, "auto" if paths prescribe one.
     Raises `InputError` for a wrong scene, grid or point, and for a folder of something else.
     """
     check_folder(folder)
@@ -172,7 +174,7 @@ def plan_map(
 
 
 def default_point(scene: Scene) -> str:
-    """The tool of the scene, or a point of the last body: payload, tip, last."""
+    """Return the scene's tool, else a point of the last body: that of a payload, "tip", or the last one."""
     body = scene.body[-1]
     carried = [one.point for one in scene.payload if one.point.partition(".")[0] == body.name]
     points = ["tip"] if body.rigid is None else list(body.rigid.points)
@@ -181,10 +183,9 @@ def default_point(scene: Scene) -> str:
 
 
 def make_map(plan: MapPlan, batch: Batch, watcher: Watcher) -> PoseMap:
-    """All poses of the grid; parts that an earlier run of the same plan has judged are read from the folder.
+    """Compute all poses of the grid; parts from an earlier run of the same plan are read from the folder.
 
-    Raises `InputError` for a point or an axis that the robot has not and without motors, `SolveError` where no pose is
-    found at all.
+    Raises `InputError` without motors, and for an unknown point; `SolveError` if no pose is possible.
     """
     solution = prepare_scene(plan.scene, watcher)
     if not solution.model.motors:
@@ -246,10 +247,7 @@ _evaluators = local()  # which serves one thread
 
 @dataclass(frozen=True)
 class _PosesOf:
-    """What poses are judged with: the plan of a map, folders with allowed Python files, some posture q (n_q,).
-
-    `key` differs where any of them, or a file of the scene, does.
-    """
+    """Job data: plan of a map, folders with allowed Python files, some posture q (n_q,); `key`: text of all inputs."""
 
     key: str
     plan: MapPlan
@@ -312,10 +310,7 @@ def _request(plan: MapPlan) -> dict[str, Any]:
 
 
 def _kept_postures(plan: MapPlan, request: Mapping[str, Any]) -> Postures | None:
-    """Those of an earlier run of the same map, to the last digit, by which its parts are named; None without one.
-
-    Raises `InputError` where the folder has other files.
-    """
+    """Postures of an earlier run of the same map; None without one. Raises `InputError` for other files."""
     before: dict[str, Any] = {}
     with suppress(OSError, ValueError):
         before = json.loads((plan.folder / PLAN).read_text(encoding="utf-8"))
