@@ -72,7 +72,10 @@ class Milling(Record):
         return self
 
     def mean_forces(self, first: Array, last: Array) -> Array:
-        """Return means of C (…, 2, 2), N/m², of one tooth from angles `first` to `last` (…), rad, within [0, 2π]."""
+        """Return means (…, 2, 2), N/m², of one tooth's cutting forces per depth of cut and displacement.
+
+        The means are over the tooth's angles from `first` to `last` (…), rad, within [0, 2π].
+        """
         low, high = (np.clip(angle, self.entry, self.exit) for angle in (first, last))
         return (self._integral(high) - self._integral(low)) / np.asarray(last - first)[..., None, None]
 
@@ -84,13 +87,13 @@ class Milling(Record):
 
     @property
     def average(self) -> Array:
-        """The mean C̄ (2, 2), N/m², of all teeth over a turn."""
+        """Mean C̄ (2, 2), N/m², over a turn, of the cutting forces of all teeth per depth of cut and displacement."""
         return self.teeth * self.mean_forces(np.array(0.0), np.array(2 * np.pi))
 
     def feeds(self, axes: Array) -> Array:
-        """Return unit vectors (n, 2, 3), global axes, along each feed and normal to it; their product is the tool axis.
+        """Return unit vectors (n, 2, 3), global axes, along n feeds and normal to each; their product is the tool axis.
 
-        `axes` (3, 3): those of the point in rows. Raises `InputError` for a feed along the axis of the tool.
+        `axes` (3, 3): rows are axes of the point, global axes. Raises `InputError` for a feed along the tool's axis.
         """
         axis = np.array(self.axis) @ axes / np.linalg.norm(self.axis)
         given = np.eye(3)[np.abs(axis).argmin()] if self.feed is None else np.array(self.feed)
@@ -109,11 +112,11 @@ def read_milling(path: Path) -> Milling:
 
 
 def stable_depths(milling: Milling, free: FreeCoordinates, J: Array, axes: Array) -> dict[str, Array]:
-    """Return stable depths of a pose by its `free` coordinates and J (d, f), the tip's translations by s, global axes.
+    """Return stable depths of cut in a pose: `milling_depth`, m, without chatter at any speed, of the worst feed.
 
-    `axes` (3, 3): those of the tip in rows. `milling_depth`, m, without chatter at any speed, of the worst feed;
-    `milling_best_depth`, m, of the best one, `milling_feed` (3,). With speeds also `milling_lobes` (S,), m, there:
-    averaged forces take the worst feed of each speed, semi-discretization that of `milling_depth`.
+    J (d, f): displacements of the tip, global axes, by the f coordinates of which `free` are combinations; SI units.
+    `axes` (3, 3): axes of the tip in rows. `milling_best_depth`, m, is of the best feed, `milling_feed` (3,).
+    `milling_lobes` (S,), m, at S speeds: by averaged forces of the worst feed there, else that of `milling_depth`.
     """
     values, V = np.linalg.eigh((free.K + free.K.T) / 2)
     V = V[:, values < (2 * np.pi * milling.highest) ** 2]
@@ -139,12 +142,12 @@ def _lobes(milling: Milling, limits: Sequence[StabilityLimits], worst: Tip, leas
     return np.array([limit_depth(worst, milling, float(each), bounds) for each in speed])
 
 
-NEAREST, FARTHEST = 0.03, 10.0  # frequencies off a mode: half-bandwidths and its frequency, between them
-NEAR, FAR = 100, 250  # as many frequencies on each side, within a half-bandwidth and beyond it
+NEAREST, FARTHEST = 0.03, 10.0  # limits of distances from a mode: of half-bandwidths, and of its frequency
+NEAR, FAR = 100, 250  # frequencies on each side, within a half-bandwidth and beyond it
 LEAST = 1e-9  # damping ratio: without any, no depth is stable
 FINE = 0.5  # rad, of the fastest mode in a step of semi-discretization
 STEPS = (80, 400)  # of a tooth period, at least and at most
-RISE = 1.25  # from depth to depth, until one has chatter: above it may be others without
+RISE = 1.25  # ratio of tried depths: above one with chatter may be others without
 THINNEST = 1e-12  # m: below it no depth is stable
 
 
@@ -174,9 +177,9 @@ class Tip(NamedTuple):
 
 
 class StabilityLimits(NamedTuple):
-    """Depths (F, k), m, at the edge of stability at frequencies `omega` (F,), rad/s; infinite where there is none.
+    """Depths (F, k), m, at the edge of stability with chatter at `omega` (F,), rad/s, for each of k eigenvalues.
 
-    `phase` (F, k): ωτ between 0 and 2π there.
+    Infinite where there is none. `phase` (F, k), rad: ωτ between 0 and 2π there, with the tooth period τ.
     """
 
     omega: Array
@@ -185,7 +188,7 @@ class StabilityLimits(NamedTuple):
 
     @property
     def least(self) -> float:
-        """The depth, m, up to which no spindle speed has chatter."""
+        """Largest depth, m, without chatter at any spindle speed."""
         return float(self.depth.min(initial=np.inf))
 
     def lobes(self, teeth: int, speed: Array) -> Array:
@@ -206,7 +209,10 @@ class StabilityLimits(NamedTuple):
 
 
 def stability_limits(C: Array, omega: Array, G: ComplexArray) -> StabilityLimits:
-    """Return edges of stability for averaged forces `C` (d, d), N/m², by G (F, d, d), m/N, at `omega` (F,), rad/s."""
+    """Return edges of stability for averaged forces `C` (d, d), N/m², by receptances G (F, d, d), m/N, at `omega`.
+
+    `omega` (F,): angular frequencies, rad/s.
+    """
     nu = _eigenvalues(C @ G)
     with np.errstate(divide="ignore", invalid="ignore"):
         depth = np.where(nu.real > 0.0, 0.5 / nu.real, np.inf)
@@ -227,12 +233,11 @@ def _eigenvalues(A: ComplexArray) -> ComplexArray:
 
 
 def growth(tip: Tip, cutter: Milling, depth: float, speed: float) -> float:
-    """Return the largest |eigenvalue| by which a tooth period multiplies small vibrations, above 1 with chatter.
+    """Return the largest factor by which small vibrations grow in a tooth period, above 1 with chatter.
 
-    By semi-discretization (T. Insperger and G. Stépán, Int. J. Numer. Meth. Engng 61, 2004): modes couple, and teeth
-    enter and leave the cut. `depth` in m, `speed` of the spindle in rad/s. In a step, r one tooth period ago has the
-    mean and the rise of a cubic through four of its values, so that a wave needs few steps. Raises `InputError` for too
-    many waves in a tooth period.
+    By semi-discretization (T. Insperger and G. Stépán, Int. J. Numer. Meth. Engng 61, 2004). `depth` in m, `speed` of
+    the spindle in rad/s. Cubics interpolate displacements one tooth period ago, so that a wave needs few steps. Raises
+    `InputError` for too many waves in a tooth period.
     """
     (K, D, J), m, pitch = tip, len(tip.K), 2 * np.pi / cutter.teeth
     fastest = float(np.sqrt(np.abs(np.linalg.eigvals(K)).max(initial=0.0)))
@@ -259,9 +264,9 @@ def growth(tip: Tip, cutter: Milling, depth: float, speed: float) -> float:
 
 
 def limit_depth(tip: Tip, cutter: Milling, speed: float, bounds: Sequence[float]) -> float:
-    """Return the least depth (m) between `bounds` (m) above which `growth` passes 1, to 0.1 %; infinite beyond them.
+    """Return the least depth (m) between `bounds` (m) with chatter (`growth` above 1), to 0.1 %; infinite if none has.
 
-    `speed` in rad/s. If vibrations grow at the lower bound already, a depth below it; 0 below `THINNEST`.
+    `speed` of the spindle in rad/s. With chatter at the lower bound, a depth below it; 0 below `THINNEST`.
     """
     low, high = map(float, bounds)
     while growth(tip, cutter, low, speed) > 1.0:
