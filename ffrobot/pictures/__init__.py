@@ -1,1 +1,1 @@
-"""Pictures of results: figures, the report, views in space."""
+"""Pictures of results: figures, the report, 3D views."""

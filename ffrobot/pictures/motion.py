@@ -1,8 +1,7 @@
-"""How the bodies of a scene move, as a results file has it: what every moving picture is drawn from. SI units.
+"""Motion of bodies in a results file, from which all moving pictures are drawn; SI units.
 
-r = R + A (x + s Φ p) with the exaggeration s (docs/theory.md, Kinematics). Exaggerated bodies would come apart at their
-joints: each moves with the point that carries it, along a tree of joints that starts at the ground. Planar scenes are
-drawn in 3D: they move in z = 0 and turn about z.
+r = R + A (x + s Φ p) with the exaggeration s (docs/theory.md, Kinematics). To keep joints closed, exaggerated bodies
+move with the point that carries them, along a tree of joints from the ground on. Planar scenes move in z = 0.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -24,17 +23,17 @@ VISIBLE_DEFORMATION, INVISIBLE = 0.05, 1e-3  # of the mechanism's size
 
 @struct
 class MovingBody:
-    """Motion of a body at T outputs, SI units, in global axes unless stated otherwise.
+    """Motion of a body with k points at T outputs, in global axes unless stated otherwise.
 
     Attributes:
-        position: (T, 3) R, origin of its frame, in m.
-        orientation: (T, 4) of its frame, quaternions, scalar first.
-        modal: (T, n) its modal coordinates; None of a rigid body.
-        point_names: of its k points, as in the results: `link2.tip`; in the order of x.
-        points: (k, 3) where they are in the frame, undeformed, in m.
-        deflection: (T, k, 3) their Φ p, in the frame, in m.
+        position: (T, 3) R, origin of its frame, m.
+        orientation: (T, 4) quaternions of its frame, scalar first.
+        modal: (T, n) modal coordinates p, m·√kg; None for a rigid body.
+        point_names: names of the points, as in results: `link2.tip`; in the order of x.
+        points: (k, 3) undeformed positions of the points in the frame, m.
+        deflection: (T, k, 3) deflections Φ p of the points in the frame, m.
         sections: (T, k, 4) quaternions of the sections there; (T, 0, 4) in planar scenes, whose files have none.
-        shift: (T, 3) by which a unit of s moves the body as a whole, so that joints stay shut, in m; global axes.
+        shift: (T, 3) displacement of the body per unit of exaggeration s, which keeps joints closed, m; global axes.
     """
 
     name: str
@@ -53,11 +52,11 @@ class MovingBody:
         return of_quaternion(self.orientation)
 
     def turned(self, vectors: Array) -> Array:
-        """Return vectors (T, …, 3) of the frame, of any unit, in global axes: A times these."""
+        """Return vectors (T, …, 3), any unit, from the axes of the frame in global axes: A times these."""
         return np.einsum("tij,t...j->t...i", self.axes, vectors)
 
     def placed(self, places: Array) -> Array:
-        """Return R + A x (T, k, 3) of places x (T, k, 3) in the frame, m: in global axes."""
+        """Return R + A x (T, k, 3), m, global axes, of positions x (T, k, 3), m, in the frame."""
         return self.position[:, None] + self.turned(places)
 
     @property
@@ -93,7 +92,7 @@ def moving_bodies(results: Results, analysis: str, frames: Indices) -> list[Movi
 
 
 def chosen_frames(results: Results, analysis: str, count: int) -> Indices:
-    """Return at most `count` outputs (T,) equally far apart, one of them moved to the largest deflection."""
+    """Return indices (T,) of at most `count` outputs equally far apart, one moved to the largest deflection."""
     time = results.time(analysis)
     frames = np.linspace(0, len(time) - 1, min(len(time), count)).round().astype(np.intp)
     points = [f"{analysis}/points/{point}/deflection" for point in results.names(f"{analysis}/points")]
@@ -137,9 +136,9 @@ def _moving_body(results: Results, analysis: str, name: str, frames: Indices) ->
 
 
 def section_axes(bodies: Sequence[MovingBody], side: str, outputs: int) -> Array:
-    """Return the axes (T, 3, 3), columns, of a section "BODY.POINT"; of the frame in files without them.
+    """Return axes (T, 3, 3), columns, global axes, of the section at `side` "BODY.POINT"; else of the body's frame.
 
-    Those of the ground, over so many outputs T, are the global ones.
+    On the ground they are the global axes; `outputs`: T.
     """
     for body in bodies:
         if side in body.point_names:
@@ -148,7 +147,7 @@ def section_axes(bodies: Sequence[MovingBody], side: str, outputs: int) -> Array
 
 
 def size_of(bodies: Sequence[MovingBody]) -> float:
-    """Largest extent, m, of the points of all bodies over all outputs; 1 of a single place."""
+    """Return the largest extent, m, of the points of all bodies over all outputs; 1 if all coincide."""
     points = [body.global_points.reshape(-1, 3) for body in bodies]
     return float(np.ptp(np.concatenate(points), axis=0).max(initial=0.0)) or 1.0
 
@@ -159,9 +158,9 @@ def largest_deflection(bodies: Iterable[MovingBody]) -> float:
 
 
 def visible_exaggeration(size: float, deflection: float) -> float:
-    """Return the largest of 1, 2, 5, … 1000 that keeps `deflection` to a visible part of the mechanism's `size`, in m.
+    """Return the largest of 1, 2, 5, … 1000 for which `deflection` (m) is at most 5 % of the mechanism's `size` (m).
 
-    1 where not even 1000 times the deflection would be seen, as of rigid robots.
+    1 if even 1000 times the deflection is invisible, as in rigid robots.
     """
     steps = [] if 1000.0 * deflection < INVISIBLE * size else [2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0]
     return max((s for s in steps if s * deflection <= VISIBLE_DEFORMATION * size), default=1.0)
@@ -169,7 +168,7 @@ def visible_exaggeration(size: float, deflection: float) -> float:
 
 @struct
 class PointTarget:
-    """Prescribed position of a point: its `columns`, of x, y, z, and their values `wanted` (T, columns), m."""
+    """Prescribed positions of a point at T outputs: `wanted` (T, columns), m, global axes; `columns` of x, y, z."""
 
     trajectory: str
     point: str
@@ -187,7 +186,7 @@ class PointTarget:
 def targets(results: Results, analysis: str) -> list[PointTarget]:
     """Return the target of every trajectory of a point, over the first outputs of the analysis.
 
-    A forward analysis does not hold trajectories: its targets are those of the analysis its actuation comes from.
+    Targets of a forward analysis are those of the analysis from which its actuation comes.
     """
     followed = []
     time = results.time(analysis)
@@ -208,11 +207,11 @@ def targets(results: Results, analysis: str) -> list[PointTarget]:
 
 @struct
 class Marker:
-    """A place with directions that moves; deflections made larger by one move it by `exaggeration` (T, 3), m."""
+    """A moving position with k directions, such as a joint with its axes, at T outputs."""
 
     name: str  # of the joint, or of the point
     position: Array  # (T, 3) m, global axes
-    exaggeration: Array
+    exaggeration: Array  # (T, 3) displacement per unit of exaggeration, m, global axes
     directions: Array  # (T, k, 3) unit vectors in global axes
 
     def exaggerated(self, s: float) -> Array:
@@ -221,7 +220,7 @@ class Marker:
 
 
 def joint_markers(scene: Mapping[str, Any], bodies: Sequence[MovingBody]) -> list[Marker]:
-    """Return every joint at its second side, with its axes: one, two of universal joints, none of others."""
+    """Return every joint at its second side, with one axis, two (universal joints) or none."""
     markers = []
     for keys in scene.get("joint", []):
         first, second = keys["between"]
@@ -237,7 +236,7 @@ def joint_markers(scene: Mapping[str, Any], bodies: Sequence[MovingBody]) -> lis
 
 
 def tool_marker(point: str, bodies: Sequence[MovingBody]) -> Marker:
-    """Return the section "BODY.POINT" with its axes x, y, z, without them in planar scenes."""
+    """Return the section at `point` "BODY.POINT" with its axes x, y, z; without axes in planar scenes."""
     position, exaggeration = _place(point, bodies)
     axes = section_axes(bodies, point, len(position)).swapaxes(1, 2)
     is_known = any(body.sections.size for body in bodies)

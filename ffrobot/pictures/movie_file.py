@@ -1,4 +1,4 @@
-"""Movies from pictures: GIF through Pillow, MP4 (H.264) through ffmpeg, which is given the pictures as they come."""
+"""Movies from pictures: GIF by Pillow, MP4 (H.264) by ffmpeg, which receives the pictures one by one."""
 
 import shutil
 import subprocess
@@ -26,15 +26,15 @@ SECONDS = 8.0  # of a movie, unless asked for otherwise
 class MovieOptions:
     """Options of a movie."""
 
-    analysis: str | None = None  # the first that goes through time if None
-    seconds: float = SECONDS  # how long it plays; the whole of the analysis is shown, faster or slower than in truth
-    scale: float | None = None  # of deflections; as large as can be seen well if None
+    analysis: str | None = None  # None: the first over time
+    seconds: float = SECONDS  # duration of the movie, which shows the whole analysis, faster or slower than in truth
+    scale: float | None = None  # exaggeration of deflections; None: chosen for visibility
 
 
 def movie_outputs(time: Array, seconds: float) -> Indices:
-    """Return the outputs (m,) that a movie of so many seconds shows: the latest not after even steps of `time` (T,), s.
+    """Return the output (m,) shown in each of m frames of a movie of some `seconds`; some are shown several times.
 
-    Some are shown several times.
+    It is the latest one not after even steps of `time` (T,), s.
     """
     wanted = np.linspace(time[0], time[-1], max(2, round(FRAMES_A_SECOND * seconds)))
     reach = 1e-9 * (time[-1] - time[0])
@@ -42,14 +42,14 @@ def movie_outputs(time: Array, seconds: float) -> Indices:
 
 
 Draw = Callable[[Results, str, Indices, float | None, list[str]], Iterable[Frame]]
-"""A frame for each of some outputs of an analysis, by a scale of deflections, with notes."""
+"""Function that draws a frame for each of some outputs of an analysis, by an exaggeration, and adds to notes."""
 
 
 def make_movie(results_path: Path, path: Path, options: MovieOptions | None, draw: Draw) -> list[str]:
-    """Write a movie (.gif, .mp4) of a results file with frames by `draw`; return notes on what is simplified.
+    """Write a movie (.gif, .mp4) of a results file with frames by `draw`; return notes on simplifications.
 
     Raises:
-        InputError: results cannot be read, have no such analysis or none that goes through time; another suffix.
+        InputError: results cannot be read, have no such analysis or none over time; another suffix.
         SolveError: the movie cannot be made or written.
     """
     options = options or MovieOptions()

@@ -1,4 +1,4 @@
-"""Where the viewer stands: before a link, before a planar scene, or before a 3D one; marks there, and colors."""
+"""Directions of view on links, planar scenes and 3D ones; marks and colors."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""What a body looks like, in its frame: its surface, the line of its stations, or lines between its points."""
+"""Shapes of bodies in their frames: the surface, the line of stations, or lines between points."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ AMPLITUDE = 0.1  # of the length: the largest displacement of a mode as drawn
 
 
 def drawn_mode(shape: Array, length: float) -> tuple[Array, Array]:
-    """Return a mode (p, 3) of a body of `length` (m) as large as pictures show any but one of zero.
+    """Return a mode shape for pictures: displacements (p, 3), m, scaled to the body's `length` (m), and sizes (p,).
 
-    Its displacement (p, 3) in m, and its size (p,) relative to the largest.
+    `shape` (p, 3), any unit, at p points. Sizes are relative to the largest, no unit.
     """
     size = np.linalg.norm(shape, axis=1)
     largest = float(size.max()) or 1.0
@@ -41,12 +41,12 @@ def drawn_mode(shape: Array, length: float) -> tuple[Array, Array]:
 
 
 def body_surface(body: ModalBody) -> PictureMesh:
-    """Return the surface of a solid as its file has it; of a beam the section swept along the axis, else its axis."""
+    """Return the surface in the file of a solid; of a beam the section swept along the axis, or its axis."""
     return body.mesh if body.stations.outline is None or body.mesh.cells.shape[1] > 2 else _swept(body)
 
 
 def _swept(body: ModalBody) -> PictureMesh:
-    """Rings of the section's corners, joined by quadrilaterals and closed by caps; two rings where the section steps.
+    """Rings of the section's corners, joined by quadrilaterals and closed by caps; two rings at a step of the section.
 
     Cross sections stay plane: the corner at a = (0, y, z) of the section moves by Φ + θ × a.
     """
@@ -74,7 +74,7 @@ def _tube(rings: int, q: int) -> Integers:
     return np.concatenate([fan[:, ::-1], sides, (rings - 1) * q + fan]).astype(np.int64)
 
 
-LAYERS = 4  # clusters that remain at least over each of the three dimensions of a link
+LAYERS = 4  # least number of clusters in each dimension of a link
 
 
 def triangles_of(cells: Integers) -> Integers:
@@ -154,7 +154,7 @@ OCTAHEDRON = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3
 
 @struct
 class Shape:
-    """Points of a `body` that coordinates move: x + s Φ p."""
+    """Points of a `body`, moved by coordinates p and exaggeration s: x + s Φ p."""
 
     body: MovingBody
     points: Array  # (p, 3) x, in the frame, in m
@@ -196,13 +196,13 @@ def coarse_surface(results: Results, body: MovingBody, size: float, limit: int, 
 
 
 def numbered_cells(shapes: Sequence[Shape]) -> list[Integers]:
-    """Return the cells of each shape, where points of all follow each other."""
+    """Return the cells of each shape, with numbers of points in one common list of all shapes."""
     first = np.cumsum([0, *(len(shape.points) for shape in shapes[:-1])])
     return [shape.cells + start for shape, start in zip(shapes, first, strict=True)]
 
 
 def line_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape:
-    """Return the line through the stations of a flexible body; adds to `notes` why there is none."""
+    """Return the line through the stations of a flexible body; without its file, `point_shape` and a note."""
     link = _modal_body(results, body, notes)
     if link is None or body.modal is None:
         return point_shape(body)
@@ -212,7 +212,7 @@ def line_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape:
 
 
 def point_shape(body: MovingBody) -> Shape:
-    """Return lines between the points of a body, of the least length that connects all; a single point is itself."""
+    """Return the shortest lines that connect all points of a body; a single point is drawn as such."""
     k = len(body.points)
     shapes = np.eye(3 * k).reshape(k, 3, 3 * k)
     cells = np.zeros((k, 1), dtype=np.int64)

@@ -21,9 +21,9 @@ SIZE_3D = (2 * SIZE[0], 1.6 * SIZE[1])  # inches
 def draw_configurations(figure: FigureRecord, results: Results) -> Figure:
     """Draw the bodies of an analysis at the outputs nearest to `figure.times`, with paths.
 
-    These are the curves of `figure`, else those of the points that have trajectories or tools. Deflections are to scale
-    in planar scenes, else as large as can be seen, unless the figure says otherwise. Postures between the first and the
-    last are lines.
+    Paths are the curves of `figure`, by default those of points with trajectories or tools. Deflections are to scale in
+    planar scenes, else exaggerated for visibility, unless the figure says otherwise. Postures between the first and
+    the last are lines.
     """
     assert figure.analysis is not None
     outputs = results.time(figure.analysis)
@@ -66,7 +66,7 @@ def draw_path(figure: FigureRecord, results: Results) -> Figure:
 
 
 def _new(results: Results, title: str, points: Array) -> tuple[Figure, list[SceneAxes]]:
-    """Of planar scenes one view; of 3D ones from a corner, and, to tell depth, from above and from where more is seen.
+    """Views: one of planar scenes; of 3D ones from a corner, from above, and from the side that shows more.
 
     `points` (…, 3), m, are those to be drawn.
     """
@@ -138,7 +138,7 @@ def draw_bode(figure: FigureRecord, results: Results) -> Figure:
 
 
 def draw_robot_modes(figure: FigureRecord, results: Results) -> Figure:
-    """Draw the lowest modes of the robot that vibrate, over its configuration (gray), in both directions."""
+    """Draw the lowest vibration modes of the robot in both directions, over its configuration (gray)."""
     assert figure.analysis is not None
     k, group = _nearest(results, figure), f"{figure.analysis}/linear"
     frequency = results[f"{group}/frequency"][k]

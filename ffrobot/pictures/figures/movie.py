@@ -53,9 +53,9 @@ def _ends(markers: Sequence[Marker], scale: float, reach: tuple[float, float], o
 class _Frames:
     """Frames: axes on which a scene is painted anew for every frame, over a background that is drawn once.
 
-    Over T outputs, as far exaggerated as it is drawn, m, global axes: `points` (T, p, 3) of the surfaces of all bodies
-    with `triangles` (t, 3) on these, `joints` (T, j, 3), the ends of `axes_of_joints` (T, a, 2, 3) and of the axes of
-    sections that follow paths, `tools` (T, 3 k, 2, 3); where each point with a path is in truth, `places` (T, 3).
+    Exaggerated positions at T outputs, m, global axes: `points` (T, p, 3) of all surfaces with `triangles` (t, 3),
+    `joints` (T, j, 3), ends of `axes_of_joints` (T, a, 2, 3) and of axes of sections that follow paths, `tools`
+    (T, 3 k, 2, 3). `places` (T, 3): true positions of points with paths.
     """
 
     def __init__(
@@ -108,7 +108,7 @@ class _Frames:
         return map(self._at, range(len(self.time)))
 
     def _at(self, k: int) -> Frame:
-        """The frame of output k: what faces away is left out, far triangles are painted first, near ones hide them."""
+        """The frame of output k: triangles that face away are left out, far ones are painted first."""
         points, view = self.points[k], self.view
         triangles = self.triangles[normals(points, self.triangles) @ view.viewer > 0.0]
         colors = lit(points, triangles, np.array(matplotlib.colors.to_rgb(FACE)), view)

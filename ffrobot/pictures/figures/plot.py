@@ -97,7 +97,7 @@ def draw_part(part: Inspection, listed: int) -> Figure:
 
 
 def draw_modes(body: ModalBody) -> Figure:
-    """Draw the lowest modes, each scaled to the same largest displacement, whose size is the color."""
+    """Draw the lowest modes, scaled to the same largest displacement; color shows the size of displacements."""
     mesh = body_surface(body)
     points, cells, count = mesh.points, mesh.cells, min(body.mode_count, MODES)
     rows = -(-count // COLUMNS)
@@ -131,7 +131,7 @@ def _view(figure: Figure, place: tuple[int, int, int], title: str) -> Axes:
 def _draw_cells(
     axes: Axes, points: Array, cells: Integers, colors: Array, edges: Integers | None = None, view: View = LINK
 ) -> None:
-    """Cells of two points as lines, larger ones as polygons; colors (c, 3). Far ones first: near ones hide them."""
+    """Draw cells of two points as lines, larger ones as polygons, far ones first; colors (c, 3)."""
     if cells.shape[1] == 2:
         lines = list(projected(points[cells], view))
         axes.add_collection(LineCollection(lines, colors=colors if edges is None else COLORS[0], linewidths=2.0))
@@ -182,7 +182,7 @@ NAMED = 6  # columns: of more, the legend has the first and the last
 
 
 def draw_time_history(axes: Axes, figure: FigureRecord, results: Results) -> None:
-    """Draw every curve of `figure` over time, several columns in one shade each; times with a value at a limit gray."""
+    """Draw the curves of `figure` over time, columns of a curve in different shades; times at a limit are shaded."""
     for k, curve in enumerate(figure.curves):
         if curve.file is not None:
             time, values = read_points(curve.file, curve.data)
@@ -252,7 +252,7 @@ def _draw_torque_speed(axes: Axes, figure: FigureRecord, results: Results) -> No
 
 
 def _draw_placement(axes: Axes, figure: FigureRecord, results: Results) -> None:
-    """Reach of a single patch along the link by mode; below, the patches found and those spread evenly."""
+    """Draw the reach of a patch along the link by mode; below, the patches found and evenly spaced ones."""
     group = f"{figure.analysis}/placement"
     check_part(results, figure, "placement", 'an analysis of kind = "placement"')
     body = results.attributes(group)["body"]
@@ -288,9 +288,9 @@ FORMATS = ("png", "pdf")  # unless asked for otherwise
 def plot_file(path: Path, folder: Path, formats: Sequence[str] = FORMATS, only: Sequence[str] = ()) -> list[Path]:
     """Draw the figures of a results file, or mesh and modes of a modal body file, into `folder`; returns the files.
 
-    A file `figures.toml` beside the results says which figures and how; without one, the main ones of the standard
-    figures are drawn. `only` are names of those that are wanted, or patterns such as "moment_*", or "*" for all. Each
-    figure is written in all `formats`: "png", "pdf", "svg".
+    A file `figures.toml` next to the results describes the figures; without one, the main ones of the standard
+    figures are drawn. `only`: names of figures, or patterns such as "moment_*", or "*" for all. Each figure is written
+    in all `formats`: "png", "pdf", "svg".
 
     Raises:
         InputError: a file cannot be read or names what is not there; no such format or figure.
@@ -358,7 +358,7 @@ def write_figure(picture: Figure, folder: Path, name: str, formats: Sequence[str
 
 
 def image_of(picture: Figure, extension: str) -> bytes:
-    """Return the file of a picture, "png", "pdf" or "svg"."""
+    """Return the content of a file with a picture; `extension`: "png", "pdf" or "svg"."""
     stream = BytesIO()
     with warnings.catch_warnings():  # of characters that the font lacks: a box stands for them
         warnings.filterwarnings("ignore", message="Glyph .* missing from")

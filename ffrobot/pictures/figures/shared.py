@@ -1,4 +1,4 @@
-"""What standard figures and charts of reports are made of: curves, names, points that bend, limits of motors."""
+"""Common parts of standard figures and charts of reports: curves, names, points that bend, limits of motors."""
 
 from __future__ import annotations
 
@@ -122,17 +122,17 @@ class FigureFile(Record):
 
 
 def check_part(results: Results, figure: FigureRecord, part: str, expected: str) -> None:
-    """Raise `InputError` where the analysis of a figure has no such part."""
+    """Raise `InputError`, with the text `expected`, if the results of a figure's analysis lack the group `part`."""
     if not results.has(f"{figure.analysis}/{part}"):
         raise InputError(f'{results.path}: figure "{figure.name}": expected {expected}', f'"{figure.analysis}"')
 
 
 def load_figures(path: Path) -> FigureFile:
-    """Read `figures.toml`. Raises `InputError` naming file, key, what was expected and what was found."""
+    """Read `figures.toml`. Raises `InputError` for unreadable files and wrong keys."""
     return validate(FigureFile, load_toml(path, "figure file"), path)
 
 
-NO_DEFLECTION = 1e-6  # of the largest: points that the reference condition fixes are there but for round-off
+NO_DEFLECTION = 1e-6  # of the largest: round-off of points that the reference condition fixes
 
 
 def curves_of(results: Results, dataset: str, column: str = "", *, magnitude: bool = False) -> tuple[Curve, ...]:
@@ -172,7 +172,7 @@ def file_name(*parts: str) -> str:
 
 
 def curve_points(results: Results, curve: Curve, scale: float) -> tuple[Array, Array]:
-    """Return abscissa (T,), time (s) or the curve's `x`, and `scale` times its values (T, columns), else as stored."""
+    """Return abscissa (T,), time (s) or the curve's `x`, and values (T, columns) times `scale`, in stored units."""
     values = results.data(curve.data)
     if curve.magnitude:
         values = np.linalg.norm(values, axis=1)[:, None]
@@ -185,7 +185,7 @@ def curve_points(results: Results, curve: Curve, scale: float) -> tuple[Array, A
 
 
 def read_points(path: Path, column: str) -> tuple[Array, Array]:
-    """Read times (T,), s, and values (T,), as they are, of a column of a CSV file whose first column is the time."""
+    """Read times (T,), s, from the first column of a CSV file, and values (T,), in its units, from another."""
     header, rows = read_csv(path, "table of points")
     if column not in header:
         raise InputError(f'{path}: expected the column "{column}"', quoted(map(shown, header)))
@@ -200,20 +200,20 @@ POINTS = 60  # of that curve
 
 
 def motor_limits(results: Results, figure: FigureRecord) -> Array:
-    """Return the limits (n, 2) of a motor, speeds and moments in the units of the diagram; see `limit_curves`."""
+    """Return points (n, 2) of a motor's limits, speed and torque in the units of the diagram; see `limit_curves`."""
     assert figure.joint is not None
     points = [curve_points(results, curve, figure.scale) for curve in figure.curves]
     speed, moment = (max(float(abs(one).max()) for one in each) for each in zip(*points, strict=True))
-    # Each coordinate of a joint has its limits: those of the one that the first curve is of, "…/moment[1]".
+    # Limits of the joint coordinate in the first curve, "…/moment[1]".
     number = int(figure.curves[0].data.partition("[")[2].rstrip("]") or 0)
     limits = [coordinate.limits for coordinate in joint_coordinates(results.scene, figure.joint)]
     return limit_curves(limits[number] if number < len(limits) else MotorLimits(), speed, moment)
 
 
 def limit_curves(limits: MotorLimits, speed: float, moment: float) -> Array:
-    """Return the bounds |τ| ≤ τ_max, |γ̇| ≤ γ̇_max and |τ γ̇| ≤ P_max: (n, 2) speeds and moments, NaN between pieces.
+    """Return points (n, 2), speed and torque, of bounds |τ| ≤ τ_max, |γ̇| ≤ γ̇_max, |τ γ̇| ≤ P_max; NaN between curves.
 
-    `speed` (rad/s or m/s) and `moment` (N·m or N) are the largest of the data; curves without an end go further.
+    `speed` (rad/s or m/s) and `moment` (N·m or N) are the largest of the data; unbounded curves go further.
     """
     has_moment, has_speed, has_power = known = np.isfinite([limits.moment, limits.speed, limits.power])
     if not known.any():

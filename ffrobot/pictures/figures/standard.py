@@ -1,4 +1,4 @@
-"""The standard figures of any scene: what is worth seeing of the results that are there."""
+"""The standard figures of any scene, as far as its results have the data."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from ...results.joints import Coordinate, joint_coordinates, labelled_coordinate
 from .shared import Curve, FigureRecord, bending_points, both_ways, curves_of, file_name, members
 
 ROUND_OFF = 1e-9  # rad: bodies that turn no further do not turn; of the largest modal coordinates and forces
-SEEN = 5e-3  # of the largest: smaller components of a deflection, differences of a voltage, cannot be seen
+SEEN = 5e-3  # of the largest: smaller components of deflections, differences of voltages, are invisible
 TOGETHER = 2  # runs of which a figure has all components
 AXES = "xyz"
 ABOUT = {"mx": "about x", "my": "about y", "mz": "about z"}
 
 
 def main_figures(results: Results) -> tuple[FigureRecord, ...]:
-    """Return robot, paths, motors, largest deflections, stresses, voltages, modes, first response of linear models."""
+    """Return figures of robot, paths, motors, largest deflections, stresses, voltages, modes, first response."""
     return _drawn(results, MAIN)
 
 
 def standard_figures(results: Results, runs: int | None = None) -> tuple[FigureRecord, ...]:
     """Return the main figures, then angles, modes, forces, reactions, energies, other points and responses.
 
-    `runs`: so many analyses of several files are drawn together.
+    `runs`: number of analyses that are drawn together, if of several files.
     """
     main = _drawn(results, MAIN, runs)
     return main + tuple(record for record in _drawn(results, OTHERS, runs) if record not in main)
@@ -74,7 +74,7 @@ def _of_analysis(kind: str, title: str, analysis: str, *names: str, **more: Any)
 
 
 def _configurations(results: Results) -> Iterator[FigureRecord]:
-    """Of the first analysis that goes through time, else the first: in others the robot is hardly elsewhere."""
+    """Configurations in the first analysis over time, else in the first: others hardly differ."""
     moving = [analysis for analysis in results.analyses if len(results.time(analysis)) > 1]
     for analysis in [*moving, *results.analyses][:1]:
         outputs = results.time(analysis)
@@ -83,7 +83,7 @@ def _configurations(results: Results) -> Iterator[FigureRecord]:
 
 
 def _paths(results: Results) -> Iterator[FigureRecord]:
-    """Where the point of every trajectory should go and where it went: in the plane, else by component over time."""
+    """Prescribed and actual paths of points: in the plane, else by component over time."""
     for trajectory in results.scene.get("trajectory", []):
         name, point = trajectory["name"], trajectory.get("point")
         groups = (f"{analysis}/trajectories/{name}" for analysis in results.analyses if point is not None)
@@ -173,7 +173,7 @@ def _modes(results: Results) -> Iterator[FigureRecord]:
 
 
 def _trajectory_forces(results: Results) -> Iterator[FigureRecord]:
-    """What keeps points and angles on their paths; along a joint it is what its motor does, which is drawn anyway."""
+    """Forces that keep points and angles on their paths, except those along joints: torques of their motors."""
     for trajectory in results.scene.get("trajectory", []):
         name, joint = trajectory["name"], trajectory.get("joint")
         slides = any(coordinate.unit == "m" for coordinate in joint_coordinates(results.scene, str(joint)))

@@ -1,4 +1,4 @@
-"""How figures look, and parallel projection on plain axes: matplotlib's third dimension squeezes thin bodies."""
+"""Style of figures, and parallel projection on plain axes: matplotlib's third dimension squeezes thin bodies."""
 
 import re
 import textwrap
@@ -47,7 +47,7 @@ SUPERSCRIPTS = str.maketrans("−0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 class Ticks(ScalarFormatter):
-    """Labels of ticks as plain text: the parser of formulas takes a seventh of the time to draw a figure."""
+    """Labels of ticks as plain text, which saves a seventh of the time to draw a figure."""
 
     def get_offset(self) -> str:
         """Return the power of ten of all labels, "×10⁻⁵"."""
@@ -55,12 +55,12 @@ class Ticks(ScalarFormatter):
 
 
 def style() -> AbstractContextManager[None]:
-    """The settings of matplotlib within which figures are drawn and written."""
+    """Return the context with matplotlib's settings for drawing and writing figures."""
     return matplotlib.rc_context(SETTINGS)
 
 
 def new_axes(title: str) -> tuple[Figure, Axes]:
-    """An empty figure with its axes."""
+    """Return an empty figure with titled axes."""
     figure = Figure(figsize=SIZE, layout="constrained")
     axes = figure.subplots()
     lines = [title] if "$" in title else textwrap.wrap(title, 52)  # no line ends within a formula
@@ -72,9 +72,9 @@ def new_axes(title: str) -> tuple[Figure, Axes]:
 
 
 def line_style(k: int, points: int, *, alone: bool = False) -> dict[str, Any]:
-    """Return the style of the k-th curve of so many points: sparse markers and dashes distinguish equal curves.
+    """Return the style of the k-th curve, of `points`: sparse markers and dashes distinguish equal curves.
 
-    A curve that is `alone` has none: on one that rings they look like samples.
+    A curve that is `alone` has none: on a vibration they look like samples.
     """
     if alone and points > 1:
         return {"color": COLORS[k % len(COLORS)]}
@@ -89,16 +89,13 @@ def line_style(k: int, points: int, *, alone: bool = False) -> dict[str, Any]:
 
 
 def shades(count: int) -> list[Any]:
-    """Colors of `count` ordered series, dark to light."""
+    """Return colors of `count` ordered series, dark to light."""
     colormap = matplotlib.colormaps[ORDERED]
     return [colormap(0.9 * k / max(1, count - 1)) for k in range(count)]
 
 
 def literal(figure: Figure) -> Figure:
-    """Return the figure with `$`, `_`, `^` and backslashes of its texts drawn as they are: names are no formulas.
-
-    Figures that users describe themselves may have formulas; ticks always have.
-    """
+    """Return the figure with `$`, `_`, `^` and backslashes of its texts drawn as they are: names are no formulas."""
     for axes in figure.axes:
         titles = (axes.title, axes._left_title, axes._right_title, axes.xaxis.label, axes.yaxis.label)  # type: ignore[attr-defined]
         legends = [one for one in (axes.get_legend(), *figure.legends) if one is not None]
@@ -124,12 +121,12 @@ DARKEST = 0.6  # how bright a cell is that the light passes along
 
 
 def projected(points: Array, view: View) -> Array:
-    """Return page coordinates (…, 2), m, of points (…, 3) in parallel projection."""
+    """Return page coordinates (…, 2) of points (…, 3) in parallel projection, m."""
     return np.stack([points @ view.right, points @ view.up], axis=-1)
 
 
 def normals(points: Array, cells: Integers) -> Array:
-    """Return unit normals (c, 3) of triangles or quadrilaterals `cells` (c, v) on points (p, 3); zero without area."""
+    """Return unit normals (c, 3) of triangles or quadrilaterals `cells` (c, v) on points (p, 3), m; 0 without area."""
     first = points[cells[:, 0]]
     areas = np.cross(points[cells[:, 1]] - first, points[cells[:, -1]] - first)
     return areas / np.maximum(np.linalg.norm(areas, axis=1, keepdims=True), 1e-300)
@@ -141,16 +138,16 @@ def sides(cells: Integers) -> Integers:
 
 
 def lit(points: Array, cells: Integers, colors: Array, view: View) -> Array:
-    """Return colors (c, 3), red, green, blue from 0 to 1, of cells in a light from above the viewer.
+    """Return `colors` (c, 3), red, green, blue from 0 to 1, of cells (c, v) in light from above the viewer.
 
-    Normals of cells may point either way; hidden cells are painted over.
+    `points` (p, 3) in m. Normals of cells may point either way.
     """
     light = (view.viewer + view.up) / np.linalg.norm(view.viewer + view.up)
     return colors * (DARKEST + (1.0 - DARKEST) * np.abs(normals(points, cells) @ light))[:, None]
 
 
 def directions(axes: Axes, size: float, view: View) -> None:
-    """Arrows of `size` (m) along x, y and z below the picture, and a bar of a round length along x."""
+    """Draw arrows of `size` (m) along x, y and z below the picture, and a bar of a round length along x."""
     (left, right), bottom = axes.get_xlim(), axes.get_ylim()[0]
     x, y = left + 0.05 * (right - left), bottom - 2.0 * size
     for axis, name in zip(np.eye(3), "xyz", strict=True):
@@ -167,13 +164,13 @@ def directions(axes: Axes, size: float, view: View) -> None:
     axes.autoscale_view()
 
 
-FACING = 1e-3  # component of a unit normal towards the viewer from which on a cell is drawn
+FACING = 1e-3  # least component of a drawn cell's unit normal towards the viewer
 
 
 class SceneAxes:
-    """Axes for points (…, 3), m, in global axes, as a viewer sees them.
+    """Axes for points (…, 3), m, global axes, in parallel projection.
 
-    Against a coordinate axis the other two have numbers, from elsewhere all three have arrows. `finish` sets the
+    Views along a coordinate axis have scales of the other two, other views arrows of all three. `finish` sets the
     ranges, after everything is drawn.
     """
 
@@ -205,7 +202,7 @@ class SceneAxes:
         self.axes.add_collection(lines)
 
     def finish(self, label_size: float | None = None, *, is_equal: bool = True) -> None:
-        """Ranges that hold all points, and labels; unless `is_equal` the scales of the two directions may differ."""
+        """Set ranges around all points, and labels; unless `is_equal`, the scales of the two directions may differ."""
         points = np.concatenate([part for part in self.drawn if len(part)] or [np.zeros((1, 2))])
         self.axes.update_datalim(points)
         if is_equal:

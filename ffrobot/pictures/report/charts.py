@@ -1,4 +1,4 @@
-"""Charts as Plotly's JavaScript takes them; time histories of every file, laid over each other."""
+"""Charts as data for Plotly's JavaScript; time histories of all files in common charts."""
 
 from base64 import b64encode
 from collections import Counter
@@ -62,7 +62,7 @@ def runs(files: Sequence[Results]) -> list[AnalysisRun]:
 
 MAX_POINTS = 4000  # of a curve; more cannot be told apart on a screen
 
-FAR = 10  # times the largest value of a chart: limits beyond it would leave its curves flat
+FAR = 10  # times the largest value of a chart: higher limits would flatten its curves
 LIMIT_LINE = {"color": LIMIT, "dash": "dash", "width": 1.5}
 DASHES = ("solid", "dash", "dashdot", "dot")
 # Violet to green (viridis, its dark end brighter: dark pages), for series with an order: patches along a link, modes.
@@ -79,11 +79,11 @@ class Chart:
     y_label: str
     x_label: str = "time (s)"
     traces: list[dict[str, Any]] = field(default_factory=list)  # in Plotly's terms
-    # horizontal lines; where curves would be flat beside them, they wait for a click on their name
+    # horizontal lines; hidden until a click on their name if curves would be flat next to them
     limits: tuple[float, ...] = ()
-    includes: tuple[float, ...] = ()  # values that the range of y has at least
+    includes: tuple[float, ...] = ()  # values that the range of y contains
     equal_axes: bool = False  # one meter is as long on both
-    top: float = field(default=0.0, init=False)
+    top: float = field(default=0.0, init=False)  # largest |y| of visible curves
 
     def add(self, label: str, x: Array, y: Array, **style: Any) -> None:
         """Add a curve y (n,) over x (n,), in the units of the labels."""
@@ -96,7 +96,7 @@ class Chart:
 
     @property
     def layout(self) -> dict[str, Any]:
-        """Plotly's layout of this chart."""
+        """Layout of this chart in Plotly's terms."""
         texts = ", ".join(f"{limit:g}".replace("-", "−") for limit in self.limits)
         lines = [
             {
@@ -138,7 +138,7 @@ def encoded(values: NDArray[Any], kind: str = "f4") -> dict[str, str]:
 def style(k: int, color: int | None = None, part: int = 0) -> dict[str, Any]:
     """Return width, color and dashes of the k-th curve of a chart, such that no curve hides another.
 
-    The k-th color unless `color` is that of a run, which then has `part` curves before this one.
+    `color`: number of its run's color, by default k; `part`: number of earlier curves of this run.
     """
     turns, number = divmod(k if color is None else color, len(COLORS))
     dash = DASHES[(turns + part) % len(DASHES)]
@@ -146,14 +146,14 @@ def style(k: int, color: int | None = None, part: int = 0) -> dict[str, Any]:
 
 
 def shades(count: int) -> list[str]:
-    """Colors of `count` ordered series, dark to light."""
+    """Return colors of `count` ordered series, dark to light."""
     where = np.linspace(0.0, len(SHADES) - 1.0, count)
     channels = [np.interp(where, np.arange(len(SHADES)), channel) for channel in SHADES.T]
     return [f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in zip(*channels, strict=True)]
 
 
 def kept_outputs(values: Array) -> Indices:
-    """Return indices (k,) of `values` (T,), of any unit, to draw: all, or the smallest and largest of each stretch."""
+    """Return indices (k,) of `values` (T,), any unit, to draw: all, or the least and largest of each interval."""
     if len(values) <= MAX_POINTS or np.isnan(values).any():
         return np.arange(len(values))
     edges = np.linspace(0, len(values), MAX_POINTS // 2, dtype=np.intp)
@@ -171,9 +171,9 @@ def _coordinates(x: Array, y: Array) -> dict[str, Any]:
 
 
 def history_charts(files: Sequence[Results]) -> list[Chart]:
-    """Return path errors, paths, angles, deflections, forces, moments, voltages and energies of all analyses.
+    """Return charts of path errors, paths, angles, deflections, forces, torques, voltages, energies of all analyses.
 
-    Beside others, one that diverged waits for a click on its name: they would be flat.
+    Curves of a diverged analysis next to others are hidden until a click on their name.
     """
     charts = _path_errors(files)
     has_errors = bool(charts)
@@ -219,7 +219,7 @@ FOLDS = (
 
 
 def folded(charts: Sequence[Chart]) -> list[tuple[str, list[Chart]]]:
-    """Group charts by the part of the page; empty parts are omitted."""
+    """Return charts by the title of their part of the page; empty parts are omitted."""
     parts: dict[str, list[Chart]] = {title: [] for title, _ in FOLDS}
     for chart in charts:
         parts[next(title for title, starts in FOLDS if chart.name.startswith(starts))].append(chart)
@@ -232,7 +232,7 @@ PRESCRIBED = {"color": "#8b95a3", "width": 4}
 def _looks(
     record: FigureRecord, source: str, looks: dict[tuple[str, str], tuple[int, dict[str, str]]], before: int
 ) -> Iterator[tuple[Curve, dict[str, Any]]]:
-    """Every curve with its style: a run has the same color in all charts that compare runs, as in the mechanism.
+    """Every curve with its style: a run has one color in all charts that compare runs, as in the mechanism.
 
     `looks` are colors and visibility by (source, analysis); `before`: curves that the chart has already.
     """
@@ -271,6 +271,6 @@ def _path_errors(files: Sequence[Results]) -> dict[str, Chart]:
 
 
 def path_error(results: Results, analysis: str, target: PointTarget) -> Array:
-    """Return the distance (T,), m, between a point and its target, in the components that the target has."""
+    """Return the distance (T,), m, of a point from its target at T outputs, in the components of the target."""
     reached = results.data(f"{analysis}/points/{target.point}/position")[:, target.columns]
     return np.linalg.norm(reached[: len(target.wanted)] - target.wanted, axis=1)

@@ -1,4 +1,4 @@
-"""What the page needs to draw every body at any output, as deformed as asked, and every link in its modes."""
+"""Data with which the page draws bodies at any output and exaggeration, and links in their modes."""
 
 from collections.abc import Iterator, Sequence
 from itertools import count
@@ -27,14 +27,14 @@ from ..projection import AXIS_LENGTH, COLORS, LINK, PLANE, SPACE, TOOL_COLORS, T
 from ..shapes import AMPLITUDE, body_surface, coarse_surface, coarsened, drawn_mode, triangles_of
 from .charts import AnalysisRun, Chart, encoded, plain, shades
 
-ABOVE = 0.1  # of the mechanism's size: how far before the bodies of a planar scene its joints and paths are drawn
+ABOVE = 0.1  # of the mechanism's size: distance of joints and paths in front of a planar scene's bodies
 MAX_TRIANGLES = 4000  # of a body
 
 
 def mechanism(runs: Sequence[AnalysisRun]) -> tuple[dict[str, Any], list[str]]:
-    """Return the moving bodies of several runs as data for the page's script, and notes on what could not be drawn.
+    """Return the moving bodies of several runs as data for the page's script, and notes on missing parts.
 
-    Each run has a color of its own; planar scenes are seen along z.
+    Each run has its own color; planar scenes are seen along z.
     """
     notes: list[str] = []
     moved = [moving_bodies(run.results, run.analysis, _frames(run)) for run in runs]
@@ -115,7 +115,7 @@ def _marker_data(marker: Marker) -> dict[str, Any]:
     }
 
 
-# What a mode of a family does most: translation (0) or rotation (1) of which axis, and how the chart calls it.
+# Main motion of a family's modes: translation (0) or rotation (1), its axis, and its name in charts.
 MOTION = {
     "in-plane-bending": (0, 1, "y"),
     "out-of-plane-bending": (0, 2, "z"),
@@ -128,7 +128,7 @@ FINEST = 32767  # a displacement of 1
 
 @struct
 class ModesOnPage:
-    """A modal body of the page, with the labels of the bodies that it serves."""
+    """A modal body on the page, with the labels of the bodies that have it."""
 
     labels: tuple[str, ...]
     body: ModalBody
@@ -141,7 +141,7 @@ class ModesOnPage:
 
 
 def link_modes(runs: Sequence[AnalysisRun]) -> list[ModesOnPage]:
-    """Return the modal bodies behind the runs, each once, without those whose file is missing."""
+    """Return the modal bodies of all runs, each once; those whose files are missing are omitted."""
     users: dict[str, list[str]] = {}
     bodies: dict[str, ModalBody] = {}
     for run in runs:

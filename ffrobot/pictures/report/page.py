@@ -31,7 +31,7 @@ class Table(NamedTuple):
 
 
 def table_of(name: str, runs: Sequence[AnalysisRun]) -> Table:
-    """Return one of `TABLES`."""
+    """Return a table over all runs; `name`: a key of `TABLES`."""
     first, cells_of = TABLES[name]
     named = [(run.label, cells) for run in runs for cells in cells_of(run.results, run.analysis)]
     heading = (first, *(key.replace("\n", " ") for key in named[0][1])) if named else ()
@@ -139,13 +139,13 @@ TABLES: Mapping[str, tuple[str, Callable[[Results, str], Iterable[Cells]]]] = {
     "voltages": ("voltages of", voltage_cells),
     "settling": ("residual vibration", settling_cells),
 }
-"""The heading of the names of runs, and further cells, by what the page calls them."""
+"""Tables of the page by name: heading of the column with names of runs, and function of further cells."""
 
 
 def write_report(paths: Sequence[Path], path: Path) -> None:
     """Write a page about one results file, or several side by side, to `path`; an earlier report is replaced.
 
-    `paths` may have studies, too: their files, or folders of design commands.
+    `paths` may include studies: their files, or folders of design commands.
 
     Raises:
         InputError: a file is no results file and no study, or `path` is a file of another kind.
@@ -160,7 +160,7 @@ def write_report(paths: Sequence[Path], path: Path) -> None:
 
 
 def page_of(content: Mapping[str, Any]) -> str:
-    """Return the page with its content, and with Plotly where there are charts."""
+    """Return the HTML page by the variables of its template. Raises `SolveError` if Plotly or Jinja is missing."""
     try:
         from jinja2 import Environment, FileSystemLoader, StrictUndefined
         from plotly.offline import get_plotlyjs, get_plotlyjs_version

@@ -24,7 +24,7 @@ FLAT = 1e-9  # of the largest extent: no extent
 
 
 def draw_map(pose_map: PoseMap) -> list[Path]:
-    """Write a picture of each quantity that differs from pose to pose into the folder of the map; returns the files."""
+    """Write a picture of each quantity that varies over the grid into the folder of the map; returns the files."""
     files = []
     with style():
         shown = {name: one for name, one in quantities(pose_map).items() if not one.everywhere}

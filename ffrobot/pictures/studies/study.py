@@ -36,24 +36,24 @@ LOOKS: dict[State, Look] = {
 }
 
 Numbers = tuple[float | None, ...]
-"""None where there is no number: of runs that failed."""
+"""Numbers of designs; None for runs that failed."""
 
 State = Literal["best", "kept", "exceeded", "failed"]
-"""Of a design: the best one or one of a front, one that keeps all limits, one that does not, one whose run failed."""
+"""State of a design: the best or one of a front; limits are satisfied, or are not; its run failed."""
 
 ROOM = 0.05  # of an axis, beyond the least and the largest value
-DECADES = 2.0  # responses, all of one sign, that span more are drawn by their logarithms
+DECADES = 2.0  # logarithmic axis for positive responses over more
 
 
 class Drawing(Record):
-    """Base of all diagrams: `name` of their files without suffix, and a title."""
+    """Base of all diagrams: `name` of its files without suffix, and a title."""
 
     name: str
     title: str
 
 
 class Series(Record):
-    """Bars of one color: a value for each label and its error, 0 where it is not known."""
+    """Bars of one color: a value for each label of the diagram, and its error, 0 if unknown."""
 
     label: str = ""
     values: Numbers
@@ -73,8 +73,8 @@ class Bars(Drawing):
 class DesignAxis(Record):
     """One axis of parallel coordinates from `low` to `high`, with the value of every design.
 
-    `limit` of a response is an upper (`sense` 1) or lower (−1) one. `names` are those of a catalog's rows; values are
-    then numbers of rows.
+    `limit` of a response is an upper (`sense` 1) or lower (−1) one. `names`: names of a catalog's rows, whose numbers
+    are then the values.
     """
 
     label: str
@@ -87,14 +87,14 @@ class DesignAxis(Record):
     names: tuple[str, ...] = ()
 
     def place(self, values: Array) -> Array:
-        """Return positions (…) of values (…), in the unit of the axis: 0 at `low` and 1 at `high`."""
+        """Return positions (…), no unit, of values (…), in the unit of the axis: 0 at `low` and 1 at `high`."""
         scaled = np.log if self.logarithmic else np.asarray
         low, high = scaled(np.array([self.low, self.high]))
         return (scaled(values) - low) / (high - low)
 
     @property
     def places(self) -> Array:
-        """Return positions (n,) of all designs, from 0 to 1, NaN of failed ones."""
+        """Positions (n,) of n designs, no unit, from 0 to 1, NaN for failed ones."""
         return self.place(floats(self.values))
 
 
@@ -127,7 +127,7 @@ class Parallel(Drawing):
 
 
 class Progress(Drawing):
-    """The response of one design after the other; `best` is the best so far that keeps all limits."""
+    """Response of the designs in their order; `best`: the best so far that satisfies all limits."""
 
     kind: Literal["progress"] = "progress"
     y_label: str
@@ -138,7 +138,7 @@ class Progress(Drawing):
 
 
 class Band(Drawing):
-    """History with its band under spread keys, at `time` (s)."""
+    """History at `time` (s) under uncertain keys: band between `low` and `high`, worst cases `lowest` and `highest`."""
 
     kind: Literal["band"] = "band"
     y_label: str
@@ -154,7 +154,7 @@ class Band(Drawing):
 
 
 class Points(Drawing):
-    """Points joined by a curve, hollow where not `sure`."""
+    """Points on a curve; hollow unless `sure` (converged and feasible)."""
 
     kind: Literal["points"] = "points"
     x_label: str
@@ -175,7 +175,7 @@ def wrapped(label: str, letters: int) -> list[str]:
 
 
 StudyName = Literal["sensitivity", "optimum", "front", "uncertainty"]
-"""Of a file, without `.json`, as the folder of a command has it beside its tables."""
+"""Name of a study's file in the folder of a command, without `.json`."""
 
 
 class StudyTable(Record):
@@ -189,9 +189,9 @@ class Study(Record):
     """Result of a design command, as its JSON file contains it.
 
     Attributes:
-        scene: path of its file, as the command had it; `scene_name` in it.
-        headline: the answer; `good` whether it is what was asked for, None where nothing was.
-        facts: what to mind, and how it was found, a line each.
+        scene: path of the scene file; `scene_name`: name in it.
+        headline: the answer; `good`: whether it is the requested one, None if that cannot be judged.
+        facts: notes and method, a line each.
     """
 
     format: Literal["ffrobot-study"] = "ffrobot-study"
@@ -217,7 +217,7 @@ def write_study(study: Study, folder: Path) -> Path:
 
 
 def study_files(path: Path) -> list[Path]:
-    """Return study files in the folder of a design command, or `path` itself if it is one."""
+    """Return study files in the folder `path` of a design command, or `path` itself if it is one."""
     if not path.is_dir():
         return [path] if path.suffix == ".json" else []
     names = [f"{name}.json" for name in get_args(StudyName)]

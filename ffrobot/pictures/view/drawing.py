@@ -1,4 +1,4 @@
-"""What PyVista draws of grids: `main` is a process of its own (`view.draw_pictures`)."""
+"""Pictures of grids by PyVista; `main` runs in a separate process (`view.draw_pictures`)."""
 
 import pickle
 import sys
@@ -47,14 +47,14 @@ _, Y, Z = np.eye(3)
 
 
 def main() -> None:
-    """Draw the pictures on the standard input (pickled)."""
+    """Draw the list of `Picture` that the standard input contains (pickled)."""
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # it tells of every way to OpenGL that it tries
     for picture in pickle.load(sys.stdin.buffer):
         _draw_modes(picture) if picture.scale is None else _draw_motion(picture, picture.scale)
 
 
 def _draw_motion(picture: Picture, scale: float) -> None:
-    """Bodies where they were, pale, and as exaggerated, colored; the same view and colors in all frames."""
+    """Draw bodies in true positions, pale, and exaggerated, colored; all frames have one view and one color scale."""
     name, unit = SHOWN[picture.color]
     grids = []  # as it was, and exaggerated with what it is colored by
     for step in picture.steps:
@@ -91,7 +91,7 @@ def _draw_motion(picture: Picture, scale: float) -> None:
 
 
 def _is_bare(grids: Sequence[tuple[Any, Any]], name: str) -> Array:
-    """(p,) whether a point is on a body that is zero everywhere at all steps, as rigid ones are: they have no color."""
+    """(p,) whether a point is on a body that is zero everywhere at all steps (rigid): it has no color."""
     grid = grids[0][0]
     owner = np.zeros(grid.n_points, dtype=np.int64)
     owner[grid.cell_connectivity] = np.repeat(grid.cell_data["body"], np.diff(grid.offset))

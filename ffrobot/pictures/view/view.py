@@ -1,7 +1,7 @@
 """From a modal body file or a results file to a folder with grids for ParaView and pictures by PyVista.
 
 Grids are VTK's unstructured ones in HDF5, written without VTK (docs.vtk.org, "VTKHDF format specification", version
-2.0; ParaView reads it from 5.12 on): cells once, points and their data once for each time step.
+2.0; ParaView 5.12): cells once, points and their data once for each time step.
 """
 
 import pickle
@@ -47,11 +47,11 @@ class Grid:
     """Cells on P points that move over T steps; SI units.
 
     Attributes:
-        cells: blocks (c, v) of cells with v corners each, in order.
-        points: (T, P, 3) in m.
-        time: (T,) in s; None for a grid that stands still, T = 1.
+        cells: blocks (c, v) of c cells with v corners each.
+        points: (T, P, 3) in m, global axes.
+        time: (T,) in s; None for a grid that does not move, T = 1.
         point_data: (T, P) or (T, P, 3) by name.
-        cell_data: (C,) by name, for all cells of all blocks.
+        cell_data: (C,) by name, for the C cells of all blocks.
     """
 
     cells: Sequence[Integers]
@@ -102,11 +102,11 @@ def vtkhdf_image(grid: Grid) -> bytes:
 
 
 def results_grid(results: Results, analysis: str, frames: Indices, notes: list[str]) -> Grid:
-    """Return the bodies of an analysis at the outputs `frames` (T,), where they were: r = R + A (x + Φ p), m, global.
+    """Return the bodies of an analysis at the outputs `frames` (T,): r = R + A (x + Φ p), m, global axes.
 
-    Point data: `deflection` A Φ p, and `exaggeration`, by which points move when deflections are made larger by one
-    while joints stay shut: r + (s − 1) exaggeration shows deformations s times as large. `von_mises`, Pa, where
-    stresses of a surface are known. Cell data: `body`, its number in the scene. `notes` say what could not be drawn.
+    Point data: `deflection` A Φ p, and `exaggeration`, both m: r + (s − 1) exaggeration shows deformations s times as
+    large with closed joints. `von_mises`, Pa, where stresses of a surface are known. Cell data: `body`, its number in
+    the scene. Adds to `notes` on missing parts.
     """
     bodies = moving_bodies(results, analysis, frames)
     shapes = [surface_shape(results, body, notes) for body in bodies]
@@ -143,16 +143,16 @@ class Picture:
 
     titles: Sequence[str]  # above it, at each of its steps
     grid: str = ""  # the .vtkhdf file
-    path: str = ""  # of the PNG; of a movie, of a folder for one at each step, `00000.png` and so on
-    steps: tuple[int, ...] = (0,)  # of the grid's time steps; one, but of a movie
-    scale: float | None = None  # of deflections; None for a modal body, whose modes are drawn
-    length: float = 0.0  # of a modal body, in m
+    path: str = ""  # the PNG; for a movie the folder of a PNG at each step, `00000.png` and so on
+    steps: tuple[int, ...] = (0,)  # numbers of the grid's time steps; one, except for movies
+    scale: float | None = None  # exaggeration of deflections; None for a modal body, whose modes are drawn
+    length: float = 0.0  # length of a modal body, m
     in_space: bool = False  # whether z goes up, as in 3D scenes; y in planar ones
     color: str = "deflection"  # "deflection" or "von_mises"
     joints: Sequence[Marker] = ()  # at each of the steps
     tools: Sequence[Marker] = ()  # likewise sections that follow paths
-    ground: Array = field(default_factory=lambda: np.zeros((0, 3)))  # (g, 3) where joints sit on the ground, in m
-    movie: bool = False  # whether it is one
+    ground: Array = field(default_factory=lambda: np.zeros((0, 3)))  # (g, 3) joints on the ground, m, global axes
+    movie: bool = False  # whether these are frames of a movie
 
 
 def draw_pictures(pictures: Sequence[Picture]) -> None:
@@ -188,10 +188,10 @@ FRAMES = 201  # of an animation, unless asked for otherwise
 class Options:
     """Options of grids and pictures."""
 
-    analysis: str | None = None  # of a results file; all if None
-    frames: int = FRAMES  # at most so many outputs, equally far apart
-    time: float | None = None  # of the picture, in s; that of the largest deflection if None
-    scale: float | None = None  # of deflections in the picture; as large as can be seen well if None
+    analysis: str | None = None  # analysis of a results file; None: all
+    frames: int = FRAMES  # largest number of outputs, equally far apart
+    time: float | None = None  # time of the picture, s; None: that of the largest deflection
+    scale: float | None = None  # exaggeration of deflections in the picture; None: chosen for visibility
     pictures: bool | None = None  # whether to draw pictures; None: where PyVista can
 
 
@@ -210,7 +210,7 @@ def view_file(path: Path, folder: Path, options: Options | None = None) -> Viewe
 
     Raises:
         InputError: the file cannot be read, or has no such analysis.
-        SolveError: a file cannot be written, or pictures that are asked for cannot be drawn: grids are written.
+        SolveError: a file cannot be written, or requested pictures cannot be drawn, after grids are written.
     """
     options = options or Options()
     check_folder(folder)
@@ -232,7 +232,7 @@ def view_file(path: Path, folder: Path, options: Options | None = None) -> Viewe
 
 
 Views = Iterable[tuple[str, Grid, list[Picture]]]
-"""Names of files, grids, and pictures without the paths of the grids."""
+"""Names of files, grids, and pictures whose `grid` is still empty."""
 
 
 def _modal_body(path: Path) -> Views:
