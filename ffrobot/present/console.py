@@ -1,6 +1,6 @@
-"""Standard streams, the standard output as a console, progress, and what is said of errors of input and machine.
+"""Standard streams, consoles, progress, and messages of errors of input and machine.
 
-Progress is a bar on a terminal, a line now and then in a pipe or a log. Importing this loads nothing of an analysis.
+Progress is a bar on a terminal, else a line now and then. Importing this loads nothing of an analysis.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ PLAIN_WIDTH = 120  # columns where the output is no terminal
 
 
 def summary_width() -> int:
-    """Columns of the terminal, or those of the variable COLUMNS; output to a file is not squeezed into 80."""
+    """Return the number of columns for output: those of the terminal or of COLUMNS, else 120 (files, pipes)."""
     return get_terminal_size().columns if sys.stdout.isatty() or "COLUMNS" in os.environ else PLAIN_WIDTH
 
 
 def plain_console(file: TextIO, width: int) -> Console:
-    """A console of so many columns; names in a scene are no markup."""
+    """Return a console of `width` columns without markup: brackets in names are printed as they are."""
     from rich.console import Console
 
     return Console(file=file, width=width, markup=False, highlight=False, emoji=False)
 
 
 def summary_console() -> Console:
-    """Return the standard output as a console."""
+    """Return a console on the standard output."""
     return plain_console(sys.stdout, summary_width())
 
 
@@ -50,7 +50,7 @@ EVERY = 30.0  # s between lines where the error stream is no terminal
 
 
 class Display(Watcher):
-    """Shows the stage, and a bar with the remaining time for analyses; cleared when done."""
+    """Progress on the error stream: the current stage, and a bar with the remaining time of an analysis."""
 
     def __init__(self) -> None:
         self._progress: Progress | None = None
@@ -85,13 +85,13 @@ class Display(Watcher):
         self._task = self._progress.add_task(title, total=None)
 
     def stopping(self, number: int) -> None:
-        """Announce at once that the run is stopping, since evaluating and writing may take a while."""
+        """Announce at once that the run is stopping, since evaluation and output may take a while."""
         super().stopping(number)
-        # not by way of Python's streams, which the signal may have found in the middle of something
+        # not by Python's streams, which the signal may have interrupted
         os.write(sys.stderr.fileno(), b"ffrobot: stopping, and keeping what was computed (again: not keeping it)\n")
 
     def advance(self, t: float, end: float) -> bool:
-        """Update the bar, or print a line now and then."""
+        """Update the bar to time `t` of `end`, s, or print a line now and then; True: the run continues."""
         if self._progress is not None and self._task is not None:
             self._progress.update(self._task, completed=t, total=end)
         elif self._progress is None:
@@ -107,7 +107,7 @@ class Display(Watcher):
 
 
 def describe(error: Exception) -> str | None:
-    """The message of an error that comes from the user's input or the machine; None where it is a fault of ffrobot."""
+    """Return the message of an error of the user's input or the machine; None for a fault of ffrobot."""
     if isinstance(error, FfrobotError):
         return str(error)
     if isinstance(error, ModuleNotFoundError):
@@ -143,7 +143,7 @@ def _named() -> Iterator[None]:
 
 
 def ready_streams() -> None:
-    """Have streams that take every character and are there: one that was closed is as good as none."""
+    """Make standard output and error accept every character, and replace closed ones by the null device."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:

@@ -28,7 +28,7 @@ OF_FILE = ("status", "outputs", "rejected")  # of analyses: for the table of a r
 
 
 def print_details(solution: Solution, results: Results, console: Console) -> None:
-    """Print tables of analyses and their findings, wall time per stage, skipped parts, and the results' paths."""
+    """Print tables of analyses and their results, wall time per stage, skipped parts, and paths of files."""
     rows = ((name, cells) for name in results.analyses for cells in analysis_cells(results, name))
     shown = ((name, {key: text for key, text in cells.items() if key not in OF_FILE}) for name, cells in rows)
     for table in named_tables("analysis", shown):
@@ -150,7 +150,7 @@ def _chosen_modes(bodies: Sequence[Body], choice: ModeChoice) -> str:
 
 
 FREQUENCIES = 5  # that are listed, and damping ratios
-TRANSFERS = 3  # of one motor to one output, whose zeros are listed: those with the slowest to the right
+TRANSFERS = 3  # motor to output, with listed zeros: those with the slowest to the right
 UNDAMPED = 1e-9  # ratios below are round-off
 
 
@@ -185,7 +185,7 @@ def _conditions(name: str, at_rest: LinearModels | RobotAtRest) -> Iterator[tupl
 
 
 def _stiffness(compliance: Array) -> tuple[str, str]:
-    """Force over displacement along each axis, and the least of any direction, of a (3, 3) or (6, 6) compliance."""
+    """Force over displacement along each axis, and the least of any direction, by a (3, 3) or (6, 6) compliance."""
     stiffness = translational_stiffness(compliance)
     if stiffness is None:
         return "0", ""
@@ -207,7 +207,7 @@ def _control_lines(details: Mapping[str, Details]) -> Iterator[str]:
 
 
 def _of_linear(name: str, linear: LinearModels) -> Iterator[str]:
-    """Damping of the frequencies that are listed for the first time of an analysis, zeros, modes out of reach."""
+    """Damping of frequencies at the first time of an analysis, zeros, modes out of reach."""
     modes = linear.modes[0]
     ratios = modes.damping_ratio[modes.frequency > 0.0][:FREQUENCIES]
     if np.any(np.abs(ratios) > UNDAMPED):

@@ -1,4 +1,4 @@
-"""The table "can these actuators do it?" of a results file, and the motors of a catalog that can."""
+"""Tables of loads and limits of actuators in a results file, and motors of a catalog that suffice."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .lines import plain_table, print_table
 
 
 def feasibility_tables(path: Path, analysis: str | None) -> Group:
-    """Tables of one analysis of the results file at `path`, or of all. Raises `InputError` where there are none."""
+    """Return tables of loads and limits of motors and patches in one or all analyses. Raises `InputError` for none."""
     with Results(path) as results:
         judged = [name for name in results.analyses if results.has(f"{name}/feasibility")]
         if not judged:
@@ -166,9 +166,9 @@ COLUMNS = ("motor of", "choice", "ratio", "RMS (N·m)", "of rated", "peak (N·m)
 
 
 def print_motor_choice(path: Path, catalog: Path, analysis: str | None, console: Console) -> None:
-    """The best motors of each joint for each analysis; the nearest one where none fits.
+    """Print the best motors of a catalog for each joint and analysis; the nearest one where none fits.
 
-    Raises `InputError` where the catalog is wrong or no analysis has motors.
+    Raises `InputError` for a wrong catalog, and where no analysis has motors.
     """
     motors = read_catalog(catalog)
     with Results(path) as results:
@@ -196,10 +196,10 @@ def _rows(joint: str, rated: Sequence[MotorChoice]) -> Iterator[tuple[str, ...]]
 
 
 def joint_tasks(results: Results, analysis: str) -> Iterator[tuple[str, JointTask]]:
-    """Yield the load of each joint with one coordinate and a motor, without the scene's rotor.
+    """Yield name and load of each joint with a motor and one coordinate, without the inertia of the scene's rotor.
 
-    Accelerations are those of a cubic spline through the rates at outputs. Torques are scaled by the ratio of their
-    peak between outputs to the largest output.
+    Accelerations are those of a cubic spline through the rates at outputs. Torques are scaled up to their peak
+    between outputs.
     """
     time = results[f"{analysis}/time"]
     for joint in results.scene.get("joint", ()):

@@ -1,4 +1,4 @@
-"""What a modal body file, a results file or the file of a part has in it, as text."""
+"""Contents of a modal body file, a results file or the file of a part, as text."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ LISTED = 30  # faces of a part
 
 
 def describe(path: Path) -> str:
-    """Text for `ffrobot info`. Raises `InputError` for a file that is neither a modal body nor results."""
+    """Return the contents of a modal body or results file as text. Raises `InputError` for other files."""
     try:
         with open_checked(path) as file:
             kind = file.attrs.get("format")
@@ -141,7 +141,7 @@ def _rendered(table: Table) -> str:
 
 
 def print_inspection(file: Path, part: Inspection, density: float | None, console: Console) -> None:
-    """Unit, extent, volume, mass where the density (kg/m³) is known, and a table of the faces, largest first."""
+    """Print unit, extent, volume, mass if `density` (kg/m³) is known, and a table of faces, largest first."""
     from .lines import plain_table  # loads the core
 
     said = "" if part.is_declared else ", a guess by its size: --unit sets it"

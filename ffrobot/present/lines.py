@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def alike(lines: Iterable[tuple[str, str]]) -> Iterator[str]:
-    """Yield each text once, after the names of all analyses with it."""
+    """Yield each text of `lines` (analysis, text) once, after the names of all analyses with it."""
     names: dict[str, list[str]] = {}
     for name, text in lines:
         names.setdefault(text, []).append(name)
@@ -40,7 +40,7 @@ def folded(lines: Iterable[str]) -> Iterator[str]:
 
 
 def plain_table(headers: Iterable[str], rows: Iterable[Iterable[str]], *, names: int = 2) -> Table:
-    """A table without lines: the first `names` columns are text and fold, the others are numbers."""
+    """Return a table without rules: the first `names` columns are text and wrap, the others are numbers."""
     from rich.table import Table
 
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
@@ -55,14 +55,14 @@ def plain_table(headers: Iterable[str], rows: Iterable[Iterable[str]], *, names:
 
 
 def named_tables(first: str, rows: Iterable[tuple[str, Cells]]) -> Iterator[Table]:
-    """Yield a table of named rows (see `results.tables`), the names in the column `first`; none without rows."""
+    """Yield a table of rows (name, cells), with the names below the heading `first`; none without rows."""
     named = list(rows)
     if named:
         yield plain_table((first, *named[0][1]), ((name, *cells.values()) for name, cells in named))
 
 
 def tables_of(results: Results, first: str, cells_of: Callable[[Results, str], Iterable[Cells]]) -> Iterator[Table]:
-    """Yield a table of the rows of all analyses as `named_tables` does."""
+    """Yield a table of the `cells_of` all analyses, with their names below the heading `first`; none without rows."""
     return named_tables(first, ((name, cells) for name in results.analyses for cells in cells_of(results, name)))
 
 
@@ -73,11 +73,11 @@ def print_table(console: Console, headers: Iterable[str], rows: Iterable[Iterabl
 
 
 NOT_ESTIMATED = "not estimated"
-RESOLVED = 0.3  # an estimated error of modes beyond is none: they do not resolve the motion
+RESOLVED = 0.3  # largest meaningful estimated error of modes
 
 
 def error_budget(solution: Solution) -> Iterator[str]:
-    """A line each: time integration, modes, the largest deflection and its effect in the worst analysis, patches."""
+    """Yield a line on each estimated error: time integration, modes, linear deflection, patches."""
     results, analyses = integrated(solution), solution.analyses
     if aims := [result.analysis.tolerance for result in results]:
         asked = " … ".join(f"{aim:.0e}" for aim in sorted({min(aims), max(aims)}))
@@ -96,7 +96,7 @@ def error_budget(solution: Solution) -> Iterator[str]:
 
 
 def integrated(solution: Solution) -> list[AnalysisResult]:
-    """The analyses that went through time."""
+    """Return the analyses that integrated equations of motion over time."""
     return [result for result in solution.analyses.values() if result.analysis.is_integrated]
 
 

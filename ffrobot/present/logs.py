@@ -1,6 +1,6 @@
-"""What a command tells besides its output: `--verbose` on the error stream, `--log-file` with times in a file.
+"""Logs of commands: `--verbose` on the error stream, `--log-file` with times in a file.
 
-The library logs to loggers named as its modules, below "ffrobot", and leaves it to others what becomes of that.
+The library logs to loggers named as its modules, below "ffrobot", without handlers.
 """
 
 import logging
@@ -36,7 +36,7 @@ _LOG = click.Path(dir_okay=False, writable=True, path_type=Path)
 F = TypeVar("F", bound=Callable[..., object])
 
 VERBOSE = f"{__name__}.verbose"
-"""In the meta data of a click context whether `--verbose` is given."""
+"""Key in the metadata of a click context: whether `--verbose` is given."""
 
 LOGGER = logging.getLogger("ffrobot")
 LOGGER.addHandler(logging.NullHandler())
@@ -68,7 +68,7 @@ python_option = click.option(
     callback=_allow_python,
     help="Run Python files that the scene names from here too [its own folder]; repeatable.",
 )
-"""Of commands that solve scenes."""
+"""Option of commands that solve scenes."""
 
 
 def _verbose(context: click.Context, parameter: click.Parameter, verbose: bool) -> None:

@@ -1,4 +1,4 @@
-"""What `ffrobot pose` prints: where a scene starts, and the other postures that it could start in."""
+"""Output of `ffrobot pose`: the posture in which a scene starts, and other possible ones."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def print_start(path: Path, watcher: Watcher, console: Console) -> None:
-    """Joints with their guesses, the points of paths, and lines for [initial] that choose other postures."""
+    """Print joint positions at the start of a scene, points of paths, and lines of [initial] for other postures."""
     model = prepare_scene(load_robot(path), watcher).model
     first, *others = start_postures(model)
     print_table(console, ("joint", "start", "guess in [initial]", "limits"), _joints(model, first.q))
@@ -80,7 +80,7 @@ UNITS = {"revolute": ("°", 180 / np.pi), "prismatic": (" m", 1.0)}
 
 
 def chosen_posture(results: Results, model: Model) -> str:
-    """Describe the start posture (joints, branch) that the program chose; "" if the scene specifies it."""
+    """Return text on the start posture (joints, branch) that the program chose; "" if the scene specifies it."""
     scene = results.scene
     initial = scene.get("initial", {})
     named = any(initial.get(key) for key in ("angles", "joints", "branch"))

@@ -1,4 +1,4 @@
-"""What a solve prints at its end: the answer of every analysis, what motors have to do, warnings, on one screen."""
+"""Summary at the end of a solve: answers of all analyses, loads of motors, warnings, on one screen."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 VIBRATION = "vibration"
 LINES = 15  # that a summary has at most
 MOTORS = 6  # rows of motors for which analyses make room
-TEXTS, MOST_TEXTS = 2, 5  # lines of warnings and advice for which analyses, and motors, make room
+TEXTS, MOST_TEXTS = 2, 5  # lines of warnings and advice, for which analyses and motors make room
 REST = "--verbose"
 LABEL = 11  # columns of "warning", "to try" and the like
 
@@ -28,9 +28,9 @@ Row = tuple[str, ...]
 def summary_lines(
     verdict: Verdict, notes: Sequence[str], accuracy: str, results: str, width: int, printed: int = 0
 ) -> list[str]:
-    """The summary in `width` columns, at most `LINES` lines less those already `printed`.
+    """Return the lines of a summary, `width` columns wide, at most `LINES` with those already `printed`.
 
-    What has no room is counted. `notes` stand below warnings; `accuracy` and the name of the `results` come last.
+    Omitted lines are counted. `notes` follow warnings; `accuracy` and the name of the file of `results` are last.
     """
     of_analyses = [_analysis(one) for one in verdict.analyses]
     remarks: list[str] = []
@@ -113,9 +113,9 @@ def _labelled(label: str, texts: Iterable[str]) -> Iterator[str]:
 
 
 def fitted(texts: Sequence[str], room: int, width: int) -> list[str]:
-    """Wrap texts into `room` lines: the first of each label, then others, vibrations last; a count of the rest.
+    """Wrap texts, which begin with labels, into `room` lines of `width` columns; the rest is counted.
 
-    The first of all ends early where it has more lines than the first of another label leaves.
+    The first text of each label has priority, vibrations are last. A long first text is cut for a second one.
     """
     if not texts or room < 1:
         return []
