@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def study_options(folder: str, figures: str) -> Callable[[F], F]:
-    """Decorator: add the scene argument and the options of all studies; `figures`: help text of that option."""
+    """Decorator: add the scene argument and options of all studies; `folder`: default output; `figures`: help text."""
     return together(
         logging_options,
         python_option,
@@ -35,10 +35,7 @@ def study_options(folder: str, figures: str) -> Callable[[F], F]:
 def _study(
     find: Callable[..., Finding], scene_file: Path, *args: object, folder: Path, figures: bool, batch: Batch, **how: Any
 ) -> None:
-    """Find, print, and write tables, the file for reports, and figures.
-
-    Raises `SolveError` where that is not what was asked for.
-    """
+    """Find, print, and write tables, the file for reports, and figures. Raises `SolveError` for a shortfall."""
     from ..present.console import Display, summary_console
 
     protect_scene(scene_file)
@@ -66,9 +63,9 @@ def sensitivity(scene_file: Path, of: tuple[str, ...], to: tuple[str, ...], outp
     --to payload.0.mass,links.arm.geometry.length     keys as in sweeps
 
     Derivatives are finite differences of runs with the same time steps if these can be reused, and extrapolated
-    central differences otherwise, with error estimates and in percent per percent. A peak is followed at its own
-    time; a note reports if another peak becomes the largest. The same command resumes a stopped study and recomputes
-    changed runs.
+    central differences otherwise, with error estimates and in percent per percent. Derivatives of a peak are those at
+    its own time; a note appears if another peak becomes the largest. The same command resumes a stopped study and
+    recomputes changed runs.
     """  # noqa: D301 (click wants the backspace itself)
     keys = [key for text in to for key in text.split(",")]
     _study(studies.sensitivity, scene_file, of, keys, folder=output or scene_file.with_suffix(".sensitivity"), **how)

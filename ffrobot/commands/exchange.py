@@ -111,7 +111,7 @@ ELSEWHERE = {
     ".mat": "a file of MATLAB: write its table as CSV",
     ".xacro": "xacro: run `xacro FILE.xacro > ROBOT.urdf` first",
 }
-"""What takes files that are not imported, or what has to be done first, by their suffix."""
+"""Remedy for files that `import` does not read, by suffix."""
 
 
 @click.command()

@@ -26,7 +26,7 @@ def output_option(metavar: str, text: str, *, required: bool = False) -> Callabl
 
 
 def batch_options(text: str) -> Callable[[F], F]:
-    """Decorator: add the options that say who does the jobs of a command; it gets the argument `batch`."""
+    """Decorator: add `-j` (help `text`) and `--scheduler`; the command receives their `Batch` as argument `batch`."""
 
     def decorate(command: F) -> F:
         @wraps(command)
@@ -55,7 +55,7 @@ def batch_options(text: str) -> Callable[[F], F]:
 
 
 def runs_options(folder: str, of: str = "Folder") -> Callable[[F], F]:
-    """Decorator: add `-j`, `--retry` and `-o` (default `folder`); `of`: help text on the content of that folder."""
+    """Decorator: add `-j`, `--scheduler`, `--retry` and `-o`, with help text `of`, default `folder` by the input."""
     return together(
         output_option("DIR", f"{of} [{folder} next to the input]."),
         click.option("--retry", is_flag=True, help="Repetition of failed runs."),
@@ -64,7 +64,7 @@ def runs_options(folder: str, of: str = "Folder") -> Callable[[F], F]:
 
 
 def options_of(function: Callable[..., object], *names: str) -> Callable[[F], F]:
-    """Decorator: add a function's parameters as options, with types, defaults and help (see `design.studies`)."""
+    """Decorator: add the parameters `names` of `function` as options, with types, defaults and help of its Args."""
     parameters = inspect.signature(function).parameters
     args = (inspect.getdoc(function) or "").partition("Args:\n")[2].partition("\n\n")[0]
     entries = dict(re.findall(r"^ {4}(\w+): (.+(?:\n {8}.+)*)", args, re.MULTILINE))
@@ -77,7 +77,7 @@ def options_of(function: Callable[..., object], *names: str) -> Callable[[F], F]
 
 
 def _settings(parameter: inspect.Parameter, entry: str) -> dict[str, Any]:
-    """What click wants to know of one; its entry of Args begins with the help: a sentence, and maybe a bracket."""
+    """Settings of a parameter's option; its entry of Args begins with the help: a sentence, and maybe a bracket."""
     annotation, needed = parameter.annotation, parameter.kind is parameter.POSITIONAL_OR_KEYWORD
     kind, *about = get_args(annotation) if get_origin(annotation) is Annotated else (annotation,)
     default = None if parameter.default is parameter.empty else parameter.default
@@ -93,19 +93,19 @@ def _settings(parameter: inspect.Parameter, entry: str) -> dict[str, Any]:
 
 
 def protect(*files: Path | None) -> None:
-    """Write to none of these files as long as the command runs."""
+    """Protect files from being overwritten by the running command, whose outputs then raise `InputError`."""
     click.get_current_context().with_resource(protected(filter(None, files)))
 
 
 def protect_scene(file: Path, *others: Path | None) -> None:
-    """Likewise, nor to the files that a scene or link names."""
+    """Protect a scene or link file, all files it names, and `others` from being overwritten by the command."""
     from ..run.inputs import files_of
 
     protect(*files_of(file), *others)
 
 
 def reading(*files: Path) -> AbstractContextManager[None]:
-    """As `common.hdf5.reading`, which is loaded when it is needed."""
+    """Context in which files are protected from being overwritten, and errors in reading them mean damage."""
     from ..common import hdf5
 
     return hdf5.reading(*files)

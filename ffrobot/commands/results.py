@@ -21,7 +21,7 @@ movie_options = together(
     click.option("--analysis", metavar="NAME", help="Analysis of the movie, or of the grid."),
     click.option("--scale", metavar="S", type=SCALE, help="Scale of deflections [chosen for visibility]."),
 )
-"""Which movie, of what, and how."""
+"""Options of movies."""
 
 
 @click.command()
@@ -41,7 +41,7 @@ def info(file: Path) -> None:
 def feasibility(results_file: Path, analysis: str | None, catalog: Path | None) -> None:
     """Compare required torques and voltages of a results file with the limits, and list remedies.
 
-    With a catalog: motors and gears that can do it, for each joint.
+    With a catalog: motors and gears that suffice, for each joint.
     """
     from ..present.console import summary_console
     from ..present.feasibility import feasibility_tables, print_motor_choice

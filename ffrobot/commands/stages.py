@@ -63,7 +63,7 @@ def link(
 
 
 def _inspect(file: Path, output: Path | None, unit: Unit | None, density: float | None, *, force: bool) -> None:
-    """Print what a part's file holds; write a draft of its link file, and a picture with the numbers of the faces."""
+    """Print the contents of a part's file; write a draft of its link file, and a picture with numbers of faces."""
     from ..exchange.part_draft import draft_link
     from ..mesh.inspection import inspect_part
     from ..present.console import summary_console

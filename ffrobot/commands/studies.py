@@ -50,7 +50,7 @@ def _numbers(context: click.Context, parameter: click.Parameter, value: str | No
 @python_option
 @logging_options
 def bench(scene_file: Path, output: Path | None, analysis: str | None, parts: tuple[str, ...], **how: Any) -> None:
-    """Measure run time against error, and where the error comes from.
+    """Measure run time against error, and the contributions to the error.
 
     One of the scene's analyses with every integrator at every tolerance, against a reference that two integrators
     agree on. Then the error of its mesh, of its number of modes and of time integration. Tables as CSV and JSON,
@@ -246,7 +246,7 @@ def _frequencies(text: str | None) -> Array:
 def smooth(
     scene_file: Path, motion: Path | None, servo: tuple[str, ...], output: Path | None, *, force: bool, **how: Any
 ) -> None:
-    """Find out why a robot vibrates on a recorded motion, and a motion on the same path that leaves less vibration.
+    """Find why a robot vibrates on a recorded motion, and compute a motion on the same path with less vibration.
 
     MOTION is a CSV table of joint positions with times, a JointTrajectory (JSON, YAML), or a bag of ROS. Compliant
     gears (`stiffness` of joints) and flexible links vibrate; motors follow set points through position controllers.
