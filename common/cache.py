@@ -20,10 +20,9 @@ OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def cache_folder(*names: str) -> Path:
-    """The folder `names` of the cache, made where it is missing; else a new one, gone when this process ends.
+    """Return the folder `names` of the user's cache, made where it is missing, or a folder for this process alone.
 
-    The latter, with a `FfrobotWarning` that names the folder, where others may write to the cache or own it; and
-    where it cannot be written at all.
+    The latter where the cache cannot be written, or where others own it or may write to it (`FfrobotWarning`).
     """
     root = user_cache_path("ffrobot")
     places = [root.joinpath(*names[:k]) for k in range(len(names) + 1)]
@@ -53,14 +52,14 @@ def _warn(place: Path, problem: str) -> None:
 
 @cache
 def own_folder(*names: str) -> Path:
-    """A new folder, gone when this process ends."""
+    """Return a temporary folder, named after `names`, which is deleted when this process ends."""
     own = tempfile.mkdtemp(prefix=f"ffrobot-{'-'.join(names[:1])}-")
     atexit.register(shutil.rmtree, own, ignore_errors=True)
     return Path(own)
 
 
 def is_own(file: Path) -> bool:
-    """Whether a file of the cache is there, this user's, and no other may write to it."""
+    """Whether `file` exists and belongs to this user, and nobody else may write to it."""
     try:
         return not _of_others(file)
     except OSError:

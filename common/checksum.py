@@ -23,21 +23,21 @@ _PIECE = 1 << 20  # read into the same memory again: fresh pages would cost as m
 
 
 def sealed(content: bytes, line: str = _LINE) -> bytes:
-    """Return `content` and, after it, `line` with its CRC-32 and length."""
+    """Return `content`, followed by `line` with the CRC-32 and the length of `content` put in."""
     return content + line.format(zlib.crc32(content), len(content)).encode()
 
 
 def seal(path: Path) -> None:
-    """Renew the checksum of a file that was changed on purpose."""
+    """Renew the checksum at the end of a file that was changed on purpose."""
     content = path.read_bytes()
     content = content[:-_LENGTH] if _PATTERN.fullmatch(content[-_LENGTH:]) else content
     path.write_bytes(sealed(content, _RENEWED))
 
 
 def state(path: Path) -> State:
-    """Whether the file at `path` is as ffrobot wrote it, or as somebody who has changed it on purpose has sealed it.
+    """State of the file at `path` by its checksum: "sound" as ffrobot wrote it, "changed" where `seal` renewed it.
 
-    "none" where it does not say. Raises `OSError`.
+    "none" without a checksum, else "damaged". Raises `OSError`.
     """
     with path.open("rb", buffering=0) as stream:
         size = stream.seek(0, 2) - _LENGTH
@@ -59,7 +59,7 @@ def state(path: Path) -> State:
 
 
 def refuse(path: Path) -> InputError:
-    """Message about a file whose content contradicts its checksum."""
+    """Return the error for a file whose content contradicts its checksum."""
     return InputError(
         f"{path}: damaged file: its content is not what its checksum was made of; make it again, or, if it was changed"
         " on purpose, renew the checksum (ffrobot.common.checksum.seal)"

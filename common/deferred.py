@@ -18,10 +18,10 @@ USED: set[type[BaseModel]] = set()
 
 @dataclass(frozen=True)
 class Deferred:
-    """Annotation of a table's record that is imported on first use; for unions, `key` tells the members apart.
+    """Annotation of a table whose record is imported when a file has such a table.
 
-    `modules` has the records by the value of that key, "MODULE:RECORD", where no union does. A module is imported when
-    a file has such a table.
+    `tag`: for unions, the key whose value picks the record. `modules`: by that value the record as "MODULE:RECORD";
+    empty where the annotated union has the records.
     """
 
     tag: str = ""
@@ -37,7 +37,7 @@ class Deferred:
         )
 
     def records(self) -> list[type[Any]]:
-        """All of `modules`, imported."""
+        """The records of `modules`, imported."""
         return [loaded(place) for place in self.modules.values()]
 
 
@@ -56,7 +56,7 @@ class ReadBy:
 
 
 def loaded(record: type[BaseModel] | str) -> type[BaseModel]:
-    """A record, or the one at "MODULE:RECORD"."""
+    """Return `record`, imported where it is text "MODULE:RECORD"."""
     if not isinstance(record, str):
         return record
     module, _, name = record.partition(":")

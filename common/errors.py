@@ -131,7 +131,7 @@ ELSEWHERE = {
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """` (did you mean "…"?)`; empty if no known word is close, or begins with this one and an underscore."""
+    """` (did you mean "…"?)` with the known word that is close, or begins with `word` and "_"; empty without one."""
     from difflib import get_close_matches
 
     words = {one.casefold(): one for one in known}
@@ -153,6 +153,6 @@ def quoted(words: Iterable[str]) -> str:
 
 
 def either(words: Iterable[str]) -> str:
-    """`"a", "b" or "c"`."""
+    """Join names for a message: `"a", "b" or "c"`."""
     *first, last = (f'"{word}"' for word in words)
     return f"{', '.join(first)} or {last}" if first else last

@@ -23,9 +23,9 @@ def write_atomically(
     """Write `content` to a temporary name in the same folder, then rename it to `path`.
 
     HDF5 files are handed over as images made in memory: a full disk then is an ordinary failed write, which HDF5
-    itself does not survive. Raises `SolveError` naming the file, `what` it is, and the reason; `InputError` where an
-    input of the command (see `outputs.protected`) would be lost, or a file of another kind, unless the name is `ours`
-    alone, as in the cache. `private` files are for this user alone.
+    itself does not survive. Raises `SolveError` with the file, `what` it is, and the reason; `InputError` where an
+    input of the command (see `outputs.protected`) would be lost, or a file of another kind. `ours`: any kind may be
+    replaced, as in the cache. `private` files are for this user alone.
     """
     check_not_an_input(path)
     if not ours:
@@ -72,7 +72,7 @@ def check_output(path: Path, file_format: str) -> None:
     """Raise `InputError`, before any work is done, if an output cannot be written or would overwrite another file.
 
     An existing file is replaced only where it is no input, and is empty, an HDF5 file whose attribute `format` is
-    `file_format`, or one too damaged to tell. Raises `InputError`.
+    `file_format`, or one too damaged to tell.
     """
     _check_no_folder(path, "output")
     if not path.parent.is_dir():
@@ -111,21 +111,21 @@ def check_new_file(path: Path, *, replace: bool) -> None:
 
 
 def holds(path: Path, content: bytes) -> bool:
-    """Whether the file at `path` is this one already."""
+    """Whether the file at `path` has this `content`."""
     with suppress(OSError):
         return path.is_file() and path.stat().st_size == len(content) and path.read_bytes() == content
     return False
 
 
 def check_folder(folder: Path) -> None:
-    """Refuse an output folder whose place a file has; one that is absent is made later. Raises `InputError`."""
+    """Raise `InputError` where an output folder is a file or an input; a missing folder is accepted."""
     check_not_an_input(folder)
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder}: output: expected a folder", "a file")
 
 
 def check_new_folder(folder: Path) -> None:
-    """Refuse an output folder that has anything in it. Raises `InputError`."""
+    """Raise `InputError` for an output folder that is not empty; a missing one is accepted."""
     check_folder(folder)
     if folder.exists() and any(folder.iterdir()):
         raise InputError(f"{folder}: output: expected a new or empty folder", "one with files in it")

@@ -60,13 +60,13 @@ def in_memory() -> Iterator[h5py.File]:
 
 
 def image_of(file: h5py.File) -> bytes:
-    """The content of such a file."""
+    """Return the bytes of a file made by `in_memory`."""
     file.flush()
     return file.id.get_file_image()
 
 
 def read(dataset: h5py.Dataset) -> Any:
-    """All of a dataset.
+    """Return all data of a dataset.
 
     Raises `InputError` where its data are elsewhere (virtual and external datasets), fewer than its shape says, or
     complex, which ffrobot never writes.
@@ -84,25 +84,25 @@ def read(dataset: h5py.Dataset) -> Any:
 
 
 def numbers(item: object, name: str) -> NDArray[np.float64]:
-    """A dataset of numbers. Raises `InputError` where `item`, which messages call `name`, is none."""
+    """Read a dataset of numbers. Raises `InputError` where `item`, which messages call `name`, is none."""
     if not isinstance(item, h5py.Dataset) or item.dtype.kind not in "fiub":
         raise InputError(f"{name}: expected a dataset of numbers", type(item).__name__.lower())
     return np.asarray(read(item), dtype=np.float64)
 
 
 def fields_in(values: Mapping[str, Any], record: type[DataclassInstance]) -> dict[str, Any]:
-    """The fields of a `record` from a group or attributes. Raises `KeyError` for missing ones.
+    """Return the fields of `record`, by name, from a group or attributes. Raises `KeyError` for missing ones.
 
-    Those with a default may be missing, as they are in files of earlier versions; what is no field is left out.
+    Fields with a default may be missing, as in files of earlier versions; other `values` are left out.
     """
     needed = {one.name: one.default is one.default_factory is MISSING for one in fields(record)}
     return {name: values[name] for name, is_needed in needed.items() if is_needed or name in values}
 
 
 def blaming(*paths: Path) -> AbstractContextManager[None]:
-    """Context that turns read errors of HDF5 files into `InputError`, as of files not written by ffrobot.
+    """Context that turns errors in reading HDF5 files into `InputError`: damaged, or not written by ffrobot.
 
-    With all of them sound an error is the program's own, and is left as it is, as are errors that no file raises.
+    If the checksums of all `paths` are right, an error is a fault of the program and stays as it is.
     """
 
     def problem(error: Exception) -> str:
@@ -114,7 +114,7 @@ def blaming(*paths: Path) -> AbstractContextManager[None]:
 
 @contextmanager
 def reading(*paths: Path) -> Iterator[None]:
-    """Protect files that a command reads from being overwritten; errors in reading mean damage."""
+    """Context in which `paths` cannot be overwritten, and errors in reading become `InputError` (`blaming`)."""
     with protected(paths), blaming(*paths):
         yield
 

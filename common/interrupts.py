@@ -16,8 +16,8 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 class EndOfCommand:
     """Signal handler of the command line: raises `KeyboardInterrupt`, keeps the signal's `number`, 0 before one.
 
-    While a module is loaded, the process ends at once, with the exit code of a command that was stopped: what Python
-    loads modules with would print stacks, or swallow the exception.
+    While a module is loaded, the process ends at once, with the exit code of a command that was stopped: Python's
+    import system would print stacks, or swallow the exception.
     """
 
     number = 0
@@ -34,10 +34,10 @@ class EndOfCommand:
 
 @contextmanager
 def ending_at_once() -> Iterator[None]:
-    """Within its context the signals end the process at once, without a word, where they end a command anyway.
+    """Context in which Ctrl-C and SIGTERM end a command (`EndOfCommand`) at once, without a message.
 
     For work that has nothing to keep before its end, and calls libraries for long: Python answers a signal when such a
-    call returns, which may be minutes later. Whoever uses ffrobot from Python has other answers to signals, which stay.
+    call returns, which may be minutes later. Other signal handlers, as of Python users, stay.
     """
     ours = [number for number in SIGNALS if isinstance(signal.getsignal(number), EndOfCommand)]
     previous = {number: signal.signal(number, signal.SIG_DFL) for number in ours if _in_main_thread()}
@@ -50,7 +50,7 @@ def ending_at_once() -> Iterator[None]:
 
 @contextmanager
 def deferred_interrupts() -> Iterator[None]:
-    """Within its context Ctrl-C and SIGTERM wait; at its end the first of them is answered as it would have been.
+    """Context in which Ctrl-C and SIGTERM wait; at its end the first of them is answered as usual.
 
     For loading dolfinx: where Python raises while the compiled modules of version 0.9 load, C++ ends the process.
     Signals reach the main thread only: in any other the context does nothing.
@@ -88,7 +88,7 @@ def end_with_parent() -> None:
 
 
 def end_process(code: int) -> NoReturn:
-    """Exit without freeing memory, which takes Python a twentieth of a short command's time."""
+    """Exit with `code` without freeing memory, which takes Python a twentieth of a short command's time."""
     atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):

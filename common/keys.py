@@ -1,7 +1,6 @@
 """Types of keys of files: names, and numbers with limits inside which nothing overflows or runs out of memory.
 
-Names are of all scripts, but such that they fit messages, datasets, file names. The largest number is the same for all
-keys: see `tables.beyond_limits`.
+The largest number is the same for all keys: see `tables.beyond_limits`.
 """
 
 import unicodedata
@@ -18,7 +17,7 @@ _UNSEEN = ("Cc", "Cs", "Co", "Cn", "Zl", "Zp")  # control characters, line break
 
 
 def check_title(value: str, most: int = LONGEST_NAME) -> str:
-    """Raise `ValueError` for text that does not fit one line: it is empty, too long, or has unseen characters."""
+    """Return `value`. Raises `ValueError` if it is empty, longer than `most`, or has control characters."""
     if not value.strip():
         raise ValueError(f'expected text that is not empty, found "{shown(value)}"')
     if len(value) > most:
@@ -29,7 +28,7 @@ def check_title(value: str, most: int = LONGEST_NAME) -> str:
 
 
 def check_name(value: str) -> str:
-    """Check a name as `check_title`, for groups of the results file and "BODY.POINT"."""
+    """Return `value`. Raises `ValueError` as `check_title`, and for "/", "." and blanks around it."""
     if not value or value != value.strip() or "/" in value or "." in value:
         raise ValueError(f'expected a name without "/", "." and blanks around it, found "{shown(value)}"')
     return check_title(value)

@@ -30,7 +30,7 @@ ELSEWHERE = ("dolfinx", "basix", "ufl", "ffcx", "petsc4py", "slepc4py", "mpi4py"
 
 
 def missing(error: ModuleNotFoundError) -> str | None:
-    """Which package to install for a missing module; None for a module of ffrobot."""
+    """Return a message on what to install for a missing module; None for a module of ffrobot."""
     library = (error.name or "").partition(".")[0]
     if library in ("", __name__.partition(".")[0]):
         return None

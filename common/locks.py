@@ -17,10 +17,10 @@ ASK_EVERY = 0.02  # s
 
 @contextmanager
 def held(path: Path, patience: float) -> Iterator[bool]:
-    """Hold the lock `path`; False where it could not be had within `patience` s, or the file system has no locks.
+    """Context that locks the file `path`; yields False after `patience` s in vain, or where there are no locks.
 
-    The kernel lets go of it however this process ends, so that no lock is ever stale. It saves work that another
-    process does at the same time; nothing may depend on it for being right.
+    The kernel ends the lock with this process, however that ends. It saves work that another process does at the same
+    time: results have to be right without it.
     """
     descriptor = None
     with suppress(OSError):
@@ -50,12 +50,12 @@ def _locked(descriptor: int, patience: float) -> bool:
 
 
 def this_process() -> str:
-    """`HOST-PID-START`, which no other process ever has."""
+    """Return a name of this process, `HOST-PID-START`, which no other process ever has."""
     return f"{platform.node()}-{os.getpid()}-{_start_of(os.getpid())}"
 
 
 def is_running(process: str) -> bool:
-    """Whether a process, as it called itself by `this_process`, still runs; True for one of another machine."""
+    """Whether the process with this name of `this_process` still runs; True for one of another machine."""
     host, pid, start = process.rsplit("-", 2) if process.count("-") >= 2 else ("", "", "")
     if not pid.isdigit():
         return False

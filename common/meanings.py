@@ -22,9 +22,9 @@ LABELS: Mapping[str, tuple[str, ...]] = {
 
 
 class Meaning(NamedTuple):
-    """Meaning of a stored quantity: `unit` (empty: none), a few words, and those on its columns over time.
+    """Unit (empty: none) and meaning of a stored quantity; `columns`: what its columns are, as in `LABELS`.
 
-    `record`: whose field of that name `write_record` writes; empty where the dataset has a writer of its own.
+    `record`: the class whose field of that name `write_record` writes; empty where other code writes the dataset.
     """
 
     unit: str
@@ -361,13 +361,13 @@ def matches(name: str, pattern: str) -> bool:
 
 
 def names_of(record: str) -> tuple[str, ...]:
-    """Names in result files of the quantities of a record, given by its class's name; attributes begin with @."""
+    """Names in HDF5 files of the fields of a record, given by its class's name; those of attributes begin with @."""
     every = (*RESULTS.items(), *MODAL_BODY.items())
     return tuple(pattern.rpartition("/")[2] for pattern, about in every if about.record == record)
 
 
 def write_record(group: h5py.Group, record: object) -> None:
-    """Write the fields of a record that the tables have to `group`; None and () are skipped."""
+    """Write to `group` the fields of `record` that this module's tables list; None and () are skipped."""
     for name in names_of(type(record).__name__):
         value = getattr(record, field := name.removeprefix("@"))
         if value is None or (isinstance(value, tuple) and not value):

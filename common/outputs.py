@@ -24,7 +24,7 @@ _inputs: ContextVar[tuple[Path, ...]] = ContextVar("inputs", default=())
 
 @contextmanager
 def protected(paths: Iterable[Path]) -> Iterator[None]:
-    """Context in which these files cannot be overwritten, whether by symbolic link, hard link or another path."""
+    """Context in which no output may overwrite the files `paths`, by links or other names either."""
     token = _inputs.set((*_inputs.get(), *paths))
     try:
         yield
@@ -33,7 +33,7 @@ def protected(paths: Iterable[Path]) -> Iterator[None]:
 
 
 def check_not_an_input(path: Path) -> None:
-    """Raise `InputError` where `path` is, or leads to, one of the `protected` files, or to nowhere in a circle."""
+    """Raise `InputError` where `path` is, or links to, one of the `protected` files, or is a circle of links."""
     target = _target(path, "output: expected a file name")
     for source in _inputs.get():
         same = target == source.absolute() or target == _resolved(source)
@@ -44,7 +44,7 @@ def check_not_an_input(path: Path) -> None:
 
 
 def check_file_name(text: str) -> Path:
-    """`text` as a path. Raises `InputError` unless it can be the name of a regular file."""
+    """Return `text` as a path. Raises `InputError` unless it can be the name of a regular file."""
     path = Path(text)
     _target(path, "expected the name of a file")
     check_regular(path)
@@ -87,7 +87,7 @@ def check_same_kind(path: Path, content: bytes) -> None:
 
 
 def kind(content: bytes) -> str:
-    """The kind of file from its `content`: for HDF5 with its attribute `format`, for text by its beginning."""
+    """Kind of a file by its `content`: "PNG", "JSON", "text", …; "HDF5 FORMAT" with the attribute `format`."""
     start = content[:_START]
     if start.startswith(HDF5_SIGNATURE):
         return f"HDF5 {_hdf5_format(BytesIO(content))}"

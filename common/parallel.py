@@ -8,7 +8,7 @@ from .errors import FfrobotError
 
 T = TypeVar("T")
 
-# Set by Open MPI, MPICH and Intel MPI, and Slurm's own launcher.
+# Set by Open MPI, MPICH, Intel MPI, Slurm.
 _SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_SIZE")
 _RANKS = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK")
 
@@ -17,13 +17,13 @@ _is_apart = False
 
 
 def work_apart() -> None:
-    """From here on the processes of mpirun share nothing but the jobs that the first one distributes."""
+    """Have the processes of mpirun share, from now on, nothing but the jobs that the first one distributes."""
     global _is_apart
     _is_apart = True
 
 
 def is_apart() -> bool:
-    """Whether `work_apart` has been called: what is collective would wait for ever."""
+    """Whether `work_apart` has been called: collective functions would then wait for ever."""
     return _is_apart
 
 
@@ -64,7 +64,7 @@ def on_first(work: Callable[[], T]) -> T:
 def without_daemon() -> None:
     """Have Open MPI start no daemon for a process that runs alone, nor make folders; call it before loading mpi4py.
 
-    Starting one takes 0.3 s, and it complains on the terminal where the process is killed. Folders then stay behind.
+    A daemon takes 0.3 s to start. Where the process is killed, it complains on the terminal and folders stay.
     """
     if processes() == 1:
         os.environ.setdefault("OMPI_MCA_ess_singleton_isolated", "1")

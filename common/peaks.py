@@ -8,16 +8,16 @@ ALIKE = 4.0  # ratio of curvatures about a value within which it is the top of s
 
 
 def largest(time: Array, values: Array) -> tuple[float, float]:
-    """The largest |value| of `values` (T,) over `time` (T,), s, and when that is; 0 and NaN of none.
+    """Return the largest |value| of `values` (T,), in their unit, and its time (s), from `time` (T,), s.
 
-    Where neighbors show a smooth top, that of the polynomial of degree 4 through five values; next to jumps and ends
-    the largest value itself.
+    A smooth top is that of the polynomial of degree 4 through five values; next to jumps and ends it is the largest
+    value itself. Without values 0 and NaN.
     """
     return top_at(time, values, int(np.abs(values).argmax())) if len(values) else (0.0, float("nan"))
 
 
 def top_at(time: Array, values: Array, k: int) -> tuple[float, float]:
-    """Size and time (s) of the local maximum of |values| (T,) next to values[k]."""
+    """Size and time (s) of the maximum of |values| (T,), any unit, next to values[k]; `time` (T,), s: see `largest`."""
     peak, at = float(abs(values[k])), float(time[k])
     if not 2 <= k < len(values) - 2:
         return peak, at
@@ -37,7 +37,7 @@ def top_at(time: Array, values: Array, k: int) -> tuple[float, float]:
 
 
 def shares(time: Array) -> Array:
-    """Weights of times (T,) in a mean over time, by the trapezoidal rule; 1 for a single one."""
+    """Weights (T,), of sum 1, of values at `time` (T,), s, in a mean over time by the trapezoidal rule."""
     if len(time) < 2:
         return np.ones(len(time))
     steps = np.diff(time)
@@ -45,5 +45,5 @@ def shares(time: Array) -> Array:
 
 
 def root_mean_square(time: Array, values: Array) -> float:
-    """The root mean square over time of `values` (T,), in their unit."""
+    """The root mean square of `values` (T,), in their unit, over `time` (T,), s; 0 of none."""
     return float(np.sqrt(shares(time) @ values**2)) if len(values) else 0.0

@@ -22,7 +22,7 @@ _digests: dict[Path, str] = {}  # of the modules seen there, as each was when fi
 
 @contextmanager
 def python_allowed(paths: Iterable[Path]) -> Iterator[None]:
-    """Within its context scenes may run these Python files, and those in or below these folders."""
+    """Context in which scenes may run the Python files among `paths`, and in or below the folders among them."""
     before = _allowed.get()
     allow_python(paths)
     try:
@@ -32,12 +32,12 @@ def python_allowed(paths: Iterable[Path]) -> Iterator[None]:
 
 
 def allow_python(paths: Iterable[Path]) -> None:
-    """Allow Python files in these folders until the program ends; see `python_allowed`."""
+    """Allow scenes to run the Python files of `paths`, as `python_allowed`, but until the program ends."""
     _allowed.set((*_allowed.get(), *(path.resolve() for path in paths)))
 
 
 def allowed_python() -> tuple[Path, ...]:
-    """Folders with allowed Python files besides the scene's folder."""
+    """Files, and folders of files, that scenes may run besides Python files in their own folder."""
     return _allowed.get()
 
 
@@ -52,15 +52,15 @@ def check_python_file(path: Path, folder: Path) -> None:
 
 
 def count_imports(*folders: Path) -> None:
-    """Record imports from `folders`, and from below the allowed ones, in `imported_files`."""
+    """Have `imported_files` list imports from `folders`, too, and from those of `allowed_python`."""
     _folders.update(folder.resolve() for folder in (*folders, *_allowed.get()))
 
 
 def imported_files(*folders: Path) -> dict[Path, str]:
-    """SHA-256 of the files, in or below `folders`, of the modules that this process has imported.
+    """SHA-256, by file, of modules in or below `folders` that this process has imported.
 
-    Each as it was when it was seen here first. Without `folders`, of those of all `count_imports`. Installed packages
-    and this program do not count.
+    Each is of the file as it was when seen here first. Without `folders`: those of all `count_imports`. Installed
+    packages and ffrobot itself are left out.
     """
     if not _folders:  # before anything else: finding the files of all modules takes longer than many a run
         return {}
@@ -71,9 +71,9 @@ def imported_files(*folders: Path) -> dict[Path, str]:
 
 
 def count_failed(error: BaseException) -> str:
-    """Have the user's files count in which `error` was raised, too: Python forgets a module whose import fails.
+    """Have `imported_files` list the user's files that raised `error`: Python forgets a module whose import fails.
 
-    Returns "line L of FILE, in FUNCTION" of the last of them, "" where there is none.
+    Returns "line L of FILE, in FUNCTION" of the innermost of them, "" where there is none.
     """
     last, program = "", __name__.partition(".")[0]
     for frame, line in walk_tb(error.__traceback__):
@@ -101,7 +101,7 @@ def _count(file: Path) -> None:
 
 
 def own_file(module: ModuleType) -> Path | None:
-    """The file of a module of the user's: neither the script that runs, nor an installed one, nor of this program."""
+    """The file of a module of the user's; None of the script that runs, installed modules and those of ffrobot."""
     about = vars(module) if isinstance(module, ModuleType) else {}  # some modules load others where they are asked
     name, file, program = about.get("__name__"), about.get("__file__"), __name__.partition(".")[0]
     if not isinstance(file, str) or str(name).partition(".")[0] in ("__main__", "__mp_main__", program):
@@ -137,9 +137,9 @@ DEPTH = 6  # of functions in functions, lists in lists
 
 
 def digest_of_function(function: object) -> str:
-    """A hash of a function: code, constants, defaults, enclosed and global values.
+    """Hash (12 digits) of a function: code, constants, defaults, enclosed and global values.
 
-    Of the user's own modules that it names, of their files.
+    The user's own modules that the function names count with the content of their files.
     """
     digest = hashlib.sha256()
     for part in _parts(function, DEPTH):

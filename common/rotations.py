@@ -1,6 +1,6 @@
-"""Rotations in space: rotation vectors, matrices (…, 3, 3), quaternions (…, 4; scalar first).
+"""Rotations in space: rotation vectors φ, matrices (…, 3, 3), quaternions (…, 4; scalar first); φ~ is `skew`(φ).
 
-φ~ is the matrix of the cross product. A section turns by exp φ~ (docs/theory.md), with Ω = J_l φ̇.
+A section turns by exp φ~ (docs/theory.md), with Ω = J_l φ̇.
 """
 
 from math import factorial
@@ -16,7 +16,7 @@ _SERIES = {m: np.array([(-1) ** k / factorial(2 * k + m) for k in reversed(range
 
 
 def skew(vectors: Array) -> Array:
-    """The matrices (…, 3, 3) of the cross product with `vectors` (…, 3)."""
+    """The matrices φ~ (…, 3, 3) of the cross product with `vectors` φ (…, 3), in their unit."""
     vectors = np.asarray(vectors, dtype=float)
     S = np.zeros((*vectors.shape, 3))
     S[..., (2, 0, 1), (1, 2, 0)] = vectors
@@ -37,7 +37,7 @@ def left_jacobian(vectors: Array) -> Array:
 def left_jacobian_slope(vector: Array, of: Array) -> Array:
     """∂(J_l(φ) x)/∂φ (3, 3) of φ `vector` (3,) and x `of` (3,): −a x~ + (a' φ×x + b' φ×(φ×x)) 2φᵀ − b (φ×x)~ − b φ~x~.
 
-    J_l = I + a φ~ + b φ~², a' and b' by φ².
+    J_l = I + a φ~ + b φ~²; a', b' are the derivatives of a, b by φ². φ in rad, x in any unit.
     """
     across = np.cross(vector, of)
     (a, a_slope), (b, b_slope) = series(2, vector @ vector), series(3, vector @ vector)
@@ -47,7 +47,7 @@ def left_jacobian_slope(vector: Array, of: Array) -> Array:
 
 
 def series(m: int, x: Array) -> tuple[Array, Array]:
-    """c_m = Σ (−x)ᵏ/(2k + m)! of any x = φ² ≥ 0, and its derivative by x.
+    """c_m = Σ (−x)ᵏ/(2k + m)! of any x = φ² ≥ 0, rad², and its derivative by x, both in the shape of x.
 
     c_1 = sin φ/φ, c_2 = (1 − cos φ)/φ², c_3 = (φ − sin φ)/φ³; c_m' = (c_{m−1} − m c_m)/(2x), with c_0 = cos φ.
     """
@@ -83,14 +83,14 @@ def _of_skew(vectors: Array, first: int, second: int) -> Array:
 
 
 def of_quaternion(e: Array) -> Array:
-    """The matrices (…, 3, 3) of unit quaternions e (…, 4)."""
+    """The rotation matrices (…, 3, 3) of unit quaternions e (…, 4)."""
     e0, v = e[..., 0, None, None], e[..., 1:]
     outer = v[..., :, None] * v[..., None, :]
     return (e0**2 - np.sum(v * v, axis=-1)[..., None, None]) * np.eye(3) + 2 * outer + 2 * e0 * skew(v)
 
 
 def quaternions(C: Array) -> Array:
-    """Unit quaternions (…, 4), e0 ≥ 0, of matrices (…, 3, 3), from their largest component (Shepperd 1978)."""
+    """Unit quaternions (…, 4), e0 ≥ 0, of rotation matrices (…, 3, 3) by the largest component (Shepperd 1978)."""
     trace = np.trace(C, axis1=-2, axis2=-1)
     diagonal = np.diagonal(C, axis1=-2, axis2=-1)
     squares = np.concatenate([1 + trace[..., None], 1 - trace[..., None] + 2 * diagonal], axis=-1)
@@ -141,13 +141,13 @@ def rpy_of(C: Array) -> list[float]:
 
 
 def unit(vector: Array) -> Array:
-    """A vector (3,) of length 1 along one of any length that is not 0, also where squares of that are no numbers."""
+    """`vector` (3,), of any unit and length but 0, divided by its length, even where its square over- or underflows."""
     scaled = vector / np.abs(vector).max()
     return scaled / np.linalg.norm(scaled)
 
 
 def smallest_turn(axis: Array) -> Array:
-    """The triad (3, 3) in columns by the smallest rotation that brings z onto `axis`; of −z a half turn about x."""
+    """Matrix (3, 3) of the smallest rotation that brings z onto `axis` (3,), any length; for −z a half turn about x."""
     z = unit(np.asarray(axis, dtype=float))
     S, cosine, square = skew(np.cross([0.0, 0.0, 1.0], z)), z[2], z[0] ** 2 + z[1] ** 2  # Rodrigues: S = sin φ n~
     if cosine > 0.0:
@@ -158,7 +158,7 @@ def smallest_turn(axis: Array) -> Array:
 
 
 def in_3d(vectors: Array) -> Array:
-    """Extend `vectors` (…, 2) of the plane z = 0 to (…, 3); longer ones stay as they are."""
+    """Extend `vectors` (…, 2), any unit, of the plane z = 0 to (…, 3); spatial ones stay as they are."""
     return vectors if vectors.shape[-1] > 2 else np.concatenate([vectors, np.zeros_like(vectors[..., :1])], axis=-1)
 
 

@@ -11,7 +11,7 @@ R = TypeVar("R")
 
 @dataclass_transform(eq_default=False, frozen_default=True, field_specifiers=(field,))
 def struct(cls: type[T]) -> type[T]:
-    """A dataclass whose objects are compared by identity; type checkers refuse to set their fields."""
+    """Make `cls` a dataclass whose objects are compared by identity; type checkers refuse to set their fields."""
     made = dataclass(eq=False, repr=False)(cls)
     if made.__repr__ is object.__repr__:
         made.__repr__ = _shown  # type: ignore[method-assign]
@@ -24,7 +24,7 @@ def _shown(self: object) -> str:
 
 
 def kept(function: Callable[[T], R]) -> Callable[[T], R]:
-    """A function of one `struct`, which keeps the result: it is computed once for each object."""
+    """Have a `function` of one object compute its result once for each object, which keeps it."""
     name = f"{function.__module__}.{function.__qualname__}"
 
     @wraps(function)

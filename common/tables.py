@@ -22,9 +22,10 @@ COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?|[-+]?\d+,([eE][-+]?\d+)?")
 
 
 def parse_csv(text: str) -> CsvTable:
-    """Cells with commas, semicolons or tabs between them, whichever the header has; of the latter decimal commas, too.
+    """Header and cells of CSV text, between commas, semicolons or tabs, as the header has them.
 
-    Empty lines and comments (#) do not count, but for a header that is one, as NumPy writes it. Raises `csv.Error`.
+    With the latter two, numbers may have decimal commas. Empty lines and comments (#) are skipped, but for a header
+    that is a comment, as NumPy writes it. Raises `csv.Error`.
     """
     lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("sep=")]
     comments = [(k, line.lstrip("# ")) for k, line in lines if line.startswith("#")]
@@ -79,7 +80,7 @@ def _is_formula(cell: object) -> bool:
 
 
 def key_path(loc: Sequence[int | str], data: dict[str, Any], kind: str = "missing") -> str:
-    """`body "link1": rigid.mass` for ("body", 0, "rigid", "mass"); alternatives of unions are left out."""
+    """Place of a key in `data` for messages: `body "link1": rigid.mass` for ("body", 0, "rigid", "mass")."""
     path = ""
     here: Any = data
     for k, part in enumerate(loc):
@@ -94,13 +95,13 @@ def key_path(loc: Sequence[int | str], data: dict[str, Any], kind: str = "missin
 
 
 def shown(text: str) -> str:
-    """`text` in one line of a message, shortened: control characters and line breaks as Python writes them."""
+    """`text` for one line of a message: at most 60 characters, control characters and line breaks escaped."""
     text = text if len(text) <= 60 else text[:59] + "…"
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def beyond_limits(data: dict[str, Any]) -> Iterator[str]:
-    """Yield `KEY: expected …, found …` for each value in tables that no key of any file may have."""
+    """Yield `KEY: expected …, found …` for each value in `data` that is too large, long or deep for any file."""
     yield from (f"{key_path(loc, data)}: {problem}" for loc, problem in _beyond(data, ()))
 
 

@@ -23,7 +23,7 @@ TOO_DEEP = re.compile(rf"^[ \t\[]*(?:[\w-]+[ \t]*\.[ \t]*){{{2 * DEEPEST}}}", re
 
 
 def read_text(path: Path, kind: str) -> str:
-    """The text of the file at `path`, UTF-8 with or without a byte order mark; messages call it `kind`."""
+    """Read the UTF-8 text of the file at `path`. Raises `InputError`, whose message calls the file `kind`."""
     try:
         text = read_bytes(path, kind).decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -34,7 +34,7 @@ def read_text(path: Path, kind: str) -> str:
 
 
 def read_csv(path: Path, kind: str) -> CsvTable:
-    """The cells of the CSV file at `path`: see `parse_csv`; messages call it `kind`."""
+    """Read the CSV file at `path`: see `parse_csv`. Raises `InputError`, whose message calls the file `kind`."""
     try:
         return parse_csv(read_text(path, kind))
     except csv.Error as error:
@@ -42,7 +42,7 @@ def read_csv(path: Path, kind: str) -> CsvTable:
 
 
 def read_bytes(path: Path, kind: str) -> bytes:
-    """The content of the file at `path`; messages call it `kind`."""
+    """Read the bytes of the file at `path`. Raises `InputError`, whose message calls the file `kind`."""
     check_regular(path)
     try:
         return path.read_bytes()
@@ -53,7 +53,7 @@ def read_bytes(path: Path, kind: str) -> bytes:
 
 
 def load_toml(path: Path, kind: str) -> dict[str, Any]:
-    """Parse the TOML file at `path`; `kind` ("link file", "scene file") is how the error message calls it."""
+    """Parse the TOML file at `path`. Raises `InputError`, whose message calls it `kind` ("link file", …)."""
     data = parse_toml(read_text(path, kind), path, kind)
     for other, (key, command) in _KINDS.items():
         if kind in _KINDS and key in data and _KINDS[kind][0] not in data:
@@ -84,7 +84,7 @@ def check_limits(data: dict[str, Any], path: Path) -> None:
 
 
 def toml_text(data: Mapping[str, Any]) -> str:
-    """The text of a file: plain keys first, then tables, then lists of tables."""
+    """`data` as text of a TOML file: plain keys first, then tables, then lists of tables."""
     plain = {key: value for key, value in data.items() if not isinstance(value, Mapping) and not _is_tables(value)}
     parts = ["\n".join(_lines(plain))] if plain else []
     for key, value in data.items():
@@ -96,7 +96,7 @@ def toml_text(data: Mapping[str, Any]) -> str:
 
 
 def toml_line(key: str, value: object) -> str:
-    """A key with its value, in one line."""
+    """A key with its value, in one line of TOML."""
     return f"{toml_key(key)} = {_value(value)}"
 
 
@@ -123,6 +123,6 @@ def _value(value: object) -> str:
 
 
 def toml_key(key: str) -> str:
-    """A key, in quotes where it has to be."""
+    """`key` as TOML writes it, in quotes where needed."""
     bare = key.isascii() and key.replace("_", "").replace("-", "").isalnum()
     return key if bare else _value(key)

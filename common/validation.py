@@ -33,12 +33,12 @@ class Record(BaseModel):
 
     @classmethod
     def refuse_key(cls, key: str, others: Sequence[type["Record"]]) -> str:
-        """The message for a key that only `others` have; empty to call it an unknown key."""
+        """The message for a `key` that only the records `others` have; empty: the message on unknown keys."""
         return ""
 
     @classmethod
     def demand_key(cls, key: str) -> str:
-        """The message for a missing `key`; empty if the general one suffices."""
+        """The message for a missing `key`; empty: the message on missing keys."""
         return ""
 
 
@@ -56,7 +56,7 @@ def as_tuples(value: Any) -> Any:
 
 @dataclass(frozen=True)
 class OnlyIn:
-    """Marks a key that only scenes of one `space` have: in others it is an unknown key."""
+    """Mark of a key that only scenes of one `space`, "planar" or "spatial", have: in others it is an unknown key."""
 
     space: str
 
@@ -73,7 +73,7 @@ R = TypeVar("R", bound=Record)
 
 
 def existing_file(path: Path, info: ValidationInfo) -> Path:
-    """Resolve `path` against the folder of the input file it is written in, and make sure that it is there."""
+    """Return `path`, relative to the folder of the input file. Raises `ValueError` where there is no such file."""
     folder: Path = (info.context or {}).get("folder", Path())
     resolved, name = folder / path, shown(str(path))
     try:
@@ -101,8 +101,8 @@ def validate(
 ) -> R:
     """Build `record` from `data`, read from `path`; an `InputError` lists every wrong key.
 
-    `objects` are what TOML cannot hold, by the text that stands for them in `data`, `space` that of a scene; validators
-    find them in their context.
+    `objects` are values that TOML cannot hold, as functions, by the text in `data` in their place; `space` is that of a
+    scene. Validators find both in their context.
     """
     check_limits(data, path)
     USED.add(record)
@@ -277,7 +277,7 @@ def _known_keys(records: Iterable[type[BaseModel]], space: str | None) -> list[s
 
 
 def is_key(field: FieldInfo, space: str | None) -> bool:
-    """Whether tables of scenes of a `space` have it; of all with None."""
+    """Whether scenes of `space`, "planar", "spatial" or None (either), have the key of this field."""
     return all(space in (None, mark.space) for mark in field.metadata if isinstance(mark, OnlyIn))
 
 
