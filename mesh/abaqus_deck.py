@@ -23,7 +23,7 @@ _OPTIONS = ("COMBINE", "ELSET", "GENERATE", "INPUT", "INSTANCE", "LIBRARY", "NAM
 
 @dataclass
 class Keyword:
-    """Keyword line `*NAME, OPTION=value, …`, upper case but for values, with its position and data lines."""
+    """Keyword line `*NAME, OPTION=value, …`, upper case but for values, its `place` for messages and its data lines."""
 
     name: str
     options: Mapping[str, str]
@@ -34,7 +34,7 @@ class Keyword:
         return f"*{self.name}, {self.place}"
 
     def rows(self) -> Iterator[tuple[list[str], str]]:
-        """The entries of each data line, without empty ones at its end, and its place."""
+        """Yield entries and place of each data line, without empty entries at its end."""
         for line in self.data:
             entries = [entry.strip() for entry in line.text.split(",")]
             while entries and not entries[-1]:
@@ -105,10 +105,10 @@ def _keyword(text: str, place: str) -> Keyword:
 
 @dataclass
 class Sets:
-    """Named sets whose members are numbers, INSTANCE.NUMBER, or other sets; names in any case.
+    """Named sets of `what`, "nodes" or "elements": by name in upper case, and as first `spelled`.
 
-    A member is (instance, entry, place), instance "" for the scope that the set stands in; `of_instances` are the sets
-    that names of the form INSTANCE.SET mean.
+    A member is (instance, entry, place): the instance, "" for the scope of the set; a number or text that names it or
+    another set; the place for messages. `of_instances` are the sets that names INSTANCE.SET mean.
     """
 
     what: str
@@ -117,11 +117,11 @@ class Sets:
     of_instances: Mapping[str, Sets] = field(default_factory=dict)
 
     def copy(self) -> Sets:
-        """Sets of the same members, which can be added to."""
+        """Return a copy, to which members can be added."""
         return Sets(self.what, {name: list(of) for name, of in self.members.items()}, dict(self.spelled))
 
     def add(self, name: str, entries: Iterable[tuple[str, str | int, str]]) -> None:
-        """Add (instance, entry, place) to a set."""
+        """Add members (instance, entry, place) to the set `name`."""
         self.spelled.setdefault(name.upper(), name)
         self.members.setdefault(name.upper(), []).extend(entries)
 
@@ -151,7 +151,7 @@ class Sets:
                 yield instance or of, number, place
 
     def meant(self, entry: str, place: str, within: tuple[str, ...] = ()) -> Iterator[tuple[str, int, str]]:
-        """Yield the members that `entry` names: NUMBER, INSTANCE.NUMBER, SET or INSTANCE.SET."""
+        """Yield members as `numbers` for an `entry` NUMBER, INSTANCE.NUMBER, SET or INSTANCE.SET; errors likewise."""
         name = entry.strip("\"'").upper()
         of, _, short = name.rpartition(".")
         if short.isdigit():
@@ -188,8 +188,8 @@ class Scope:
     """Content of a part, an instance or the assembly: nodes and elements by number, and sets.
 
     `frame` is that of *SYSTEM, `place` where an instance is in the assembly. `nodes` are coordinates in the unit of
-    the deck, `solids` (type, nodes), `surfaces` corners, `others` the type of
-    all that are no solids, `masses` the node of each of type MASS.
+    the deck; elements are `solids` (type, nodes), `surfaces` (corners), `others` (types of all but solids), `masses`
+    (nodes of type MASS). `nsets`, `elsets` are sets of nodes and elements, `faces` the keywords *SURFACE by name.
     """
 
     frame: Frame = GLOBAL
@@ -204,7 +204,7 @@ class Scope:
     faces: dict[str, Keyword] = field(default_factory=dict)
 
     def copy(self) -> Scope:
-        """One of the same content, which can be added to."""
+        """Return a copy, to which content can be added."""
         return replace(self, **{name: of.copy() for name, of in vars(self).items() if name not in ("frame", "place")})
 
     def read(self, keyword: Keyword) -> bool:
@@ -336,7 +336,7 @@ def _instance(keyword: Keyword, parts: Mapping[str, Scope]) -> Scope:
 
 
 class Deck:
-    """Content of a deck, gathered keyword by keyword: parts in `instances`, all else in `assembly`."""
+    """Content of the deck at `path`: parts in `instances`, all else in `assembly`. Raises `InputError`."""
 
     def __init__(self, path: Path) -> None:
         self.parts: dict[str, Scope] = {}

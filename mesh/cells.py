@@ -21,9 +21,9 @@ CellName = Literal["tetrahedron", "hexahedron"]
 
 @struct
 class Cell:
-    """Topology of a cell in gmsh's order of nodes."""
+    """Topology of a cell in gmsh's order of nodes: v corners, m facets, e edges."""
 
-    corners: Array  # (v, 3) of the reference cell
+    corners: Array  # (v, 3) of the reference cell, edges of 1
     facets: Integers  # (m, 3 or 4) corners of each facet, counter-clockwise seen from outside
     edges: Integers  # (e, 2) corners of each edge; the node of degree 2 on edge k is number v + k
     nodes: dict[int, int]  # number of nodes by degree
@@ -81,7 +81,7 @@ TO_GMSH = {
 
 
 def in_gmsh_order(kind: str, cells: Integers, as_vtk: Mapping[str, list[int]] = MappingProxyType({})) -> Integers:
-    """Cells (c, v) in VTK's order of nodes, or in one that `as_vtk` makes that, in gmsh's."""
+    """Reorder nodes of cells (c, v) of type `kind` from VTK's order, or one that `as_vtk` turns into it, to gmsh's."""
     for order in (as_vtk.get(kind), TO_GMSH.get(kind)):
         cells = cells if order is None else cells[:, order]
     return cells
@@ -94,7 +94,7 @@ _BLOCK = 20_000  # cells integrated at a time
 
 @lru_cache
 def reference_nodes(cell: CellName, degree: int) -> Array:
-    """Return nodes (v, 3) of the reference cell, edges of 1: corners, middles of edges, faces and the hexahedron."""
+    """Nodes (v, 3), without unit, of the reference cell: corners, middles of edges, faces and the hexahedron."""
     shape = CELLS[cell]
     if degree == 1:
         return shape.corners
@@ -115,13 +115,13 @@ def _element(cell: CellName, degree: int) -> tuple[Any, Integers]:
 
 
 def jacobians(nodes: Array, cell: CellName, degree: int, X: Array) -> Array:
-    """Return derivatives (c, q, 3, 3) ∂x_i/∂X_d of cells with `nodes` (c, v, 3), m, at reference points X (q, 3)."""
+    """Derivatives ∂x_i/∂X_d (c, q, 3, 3), m, of cells with `nodes` (c, v, 3), m, at reference points X (q, 3)."""
     element, order = _element(cell, degree)
     return np.einsum("dqv,cvi->cqid", element.tabulate(1, X)[1:, :, order, 0], nodes, optimize=True)
 
 
 def volume_and_center(nodes: Array, cell: CellName, degree: int) -> tuple[float, Array]:
-    """Volume, m³, and its center (3,), m, of cells with `nodes` (c, v, 3), warped or curved, but for round-off."""
+    """Volume, m³, and its center (3,), m, of warped or curved cells with `nodes` (c, v, 3), m, to round-off."""
     import basix
 
     element, order = _element(cell, degree)

@@ -51,7 +51,7 @@ def check_count(count: float, given: str, hint: str = "") -> None:
 
 
 def check_shape(part: PartMesh, geometry: SolidGeometry) -> None:
-    """Raise `InputError` for a placed part without thickness, or of a length so wrong that the unit must be."""
+    """Raise `InputError` for a part without thickness, or of a length so wrong that the unit must be."""
     extent = np.ptp(part.points[part.corners.ravel()], axis=0)
     if extent.min() <= 1e-9 * extent.max():
         axis = "xyz"[int(np.argmin(extent))]
@@ -73,9 +73,9 @@ def check_sound(part: PartMesh) -> None:
 
 
 def check_neighbours(part: PartMesh) -> None:
-    """Raise `InputError` unless cells, right-handed as they are, lie on either side of the facets that they share.
+    """Raise `InputError` unless two right-handed cells that share a facet lie on either side of it.
 
-    Else three cells or more have a facet, or two on the same side of it: some lie in one another.
+    Else cells overlap: three or more have a facet, or two lie on the same side of it.
     """
     facets = part.cell_facets
     smallest = np.argmin(facets, axis=1)[:, None]
@@ -164,7 +164,7 @@ def check_quality(part: PartMesh) -> None:
 
 
 def straightened(part: PartMesh) -> PartMesh:
-    """Move mid-side nodes towards the middle of their edges until no curved cell is turned over.
+    """Return `part` with mid-side nodes moved towards the middle of their edges until no curved cell is inverted.
 
     Where a coarse cell has two edges on one smooth curve its corner between them is (nearly) flat.
     """

@@ -99,7 +99,7 @@ def geometry_nodes(mesh: Mesh) -> Integers:
 
 
 def coordinate_element(mesh: Mesh) -> basix.finite_element.FiniteElement:
-    """Basix element that maps the reference cell to the cells of `mesh`, by `geometry_nodes`."""
+    """Basix element of the map from the reference cell to cells of `mesh`; its nodes are in dolfinx's order."""
     cell = getattr(basix.CellType, cell_name(mesh))
     equispaced = basix.LagrangeVariant.equispaced
     return basix.create_element(basix.ElementFamily.P, cell, mesh.geometry.cmap.degree, equispaced)
@@ -118,7 +118,7 @@ def lagrange_element(space: FunctionSpace) -> basix.finite_element.FiniteElement
 
 
 def node_map(space: FunctionSpace) -> Integers:
-    """Return nodes (c, d) of cells of this process, ghosts too; degree of freedom 3k + i is component i of node k."""
+    """Node numbers (c, d) of this process's cells, ghosts too; degree of freedom 3k + i is component i of node k."""
     nodes = space.dofmap.list
     return np.asarray(nodes.array if _OLD else nodes, dtype=np.int64).reshape(-1, lagrange_element(space).dim)
 
@@ -136,7 +136,7 @@ def _compiling(comm: MPI.Comm) -> Iterator[dict[str, Any]]:
 
 
 def function_space(mesh: Mesh, degree: int, shape: tuple[int, ...] = ()) -> FunctionSpace:
-    """Lagrange functions with values of `shape`: continuous ones, or those of degree 0 that are constant in cells."""
+    """Space of continuous Lagrange functions with values of `shape`; of degree 0, functions constant in cells."""
     options: dict[str, Any] = {"discontinuous": degree == 0}
     if degree:
         options["lagrange_variant"] = basix.LagrangeVariant.gll_warped

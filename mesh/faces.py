@@ -37,9 +37,10 @@ class PartBoundary:
     """The boundary of a part; SI units.
 
     Attributes:
-        points: (p, 3) of the part.
+        points: (p, 3) of the part, m.
         facets: (b, 3 or 4) corners, counter-clockwise seen from outside.
-        centroid, normal: (b, 3); normals point outward.
+        centroid: (b, 3) of the facets, m.
+        normal: (b, 3) unit vectors that point outward.
         area: (b,) in m², of the straight facets.
     """
 
@@ -72,10 +73,10 @@ class PartBoundary:
 
 @struct
 class SmoothFace:
-    """A smooth face: its `facets` (k,) of the boundary, `center` (3,), m, `area`, m², mean outward `normal`, `axis`.
+    """A smooth face: numbers `facets` (k,) on the boundary, `center` (3,), m, `area`, m², mean outward `normal` (3,).
 
-    The mean normal of a bore or shaft vanishes; its `axis` (3,), which all normals are perpendicular to, takes its
-    place. `axis` is None where there is none.
+    The mean normal of a bore or shaft vanishes; its `axis` (3,), a unit vector perpendicular to all normals, takes its
+    place. Other faces have the `axis` None.
     """
 
     facets: Integers
@@ -86,7 +87,7 @@ class SmoothFace:
 
     @classmethod
     def of(cls, boundary: PartBoundary, facets: Integers) -> SmoothFace:
-        """Make a face from its facets."""
+        """Make a face of `facets` (k,), their numbers on the `boundary`."""
         weights = boundary.area[facets] / boundary.area[facets].sum()
         normals = boundary.normal[facets]
         normal = weights @ normals
@@ -105,7 +106,7 @@ class SmoothFace:
         return size > 0.5 and bool(self.normal @ direction > _ALONG * size)
 
     def distance(self, boundary: PartBoundary, position: Array) -> float:
-        """Return the approximate distance, m, from `position` (3,) to the nearest facet; of a bore, to its center."""
+        """Approximate distance, m, from `position` (3,), m, to the nearest facet; of a bore or shaft to its center."""
         if self.axis is not None:
             return float(np.linalg.norm(self.center - position))
         normals, centroids = boundary.normal[self.facets], boundary.centroid[self.facets]
@@ -121,7 +122,7 @@ class SmoothFace:
 
 
 def named_faces(source: Source, tables: PartTables) -> PartMesh:
-    """The part of `source`, placed, with its faces named and tagged.
+    """Return the part of `source`, in the link's frame, with tags of the faces that `tables` name.
 
     Raises `InputError`, with the faces that the part has, if a face is missing or two overlap.
     """

@@ -38,9 +38,9 @@ _sound: set[str] = set()  # folder and name of the forms that this process has c
 
 @contextmanager
 def form_folder(comm: MPI.Comm, compiler: str) -> Iterator[Path]:
-    """Folder of FFCx for compiled forms, where it reuses or adds them; collective on `comm`.
+    """Context of the folder in which FFCx finds and keeps compiled forms; collective on `comm`.
 
-    `compiler` names its version. Where the cache cannot be written, forms are compiled for this process alone.
+    `compiler`: its version. Where the cache cannot be written, forms are compiled for this process alone.
     """
     if comm.rank != 0:
         yield Path(comm.bcast(None))
@@ -70,7 +70,7 @@ def form_folder(comm: MPI.Comm, compiler: str) -> Iterator[Path]:
 
 
 def installed_forms() -> Path:
-    """Return the folder of compiled forms in the installation, with a folder for each kind."""
+    """Folder of compiled forms in the installation, with a folder for each interpreter, machine and version."""
     return Path(sys.prefix, "share", "ffrobot", "forms")
 
 

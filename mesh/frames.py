@@ -14,9 +14,10 @@ Kind = Literal["rectangular", "cylindrical", "spherical"]
 
 @struct
 class Frame:
-    """Coordinate system with axes `C` (3, 3; columns) at `origin` (3,), both in global axes; `kind`: its coordinates.
+    """Coordinate system of a `kind`, with axes `C` (3, 3; columns) at `origin` (3,), file's unit, in global axes.
 
-    Cylindrical ones are r, θ, z; spherical ones r, θ from the z axis, φ about it from the x axis (Nastran); degrees.
+    Cylindrical coordinates are r, θ, z; spherical ones r, θ from the z axis, φ about it from the x axis (Nastran);
+    angles in degrees.
     """
 
     origin: Array
@@ -25,7 +26,7 @@ class Frame:
 
     @classmethod
     def through(cls, points: Array, axes: str, kind: Kind = "rectangular") -> Frame:
-        """Make a frame from `points` (3, 3), file's unit: origin, on the axis `axes[0]`, on the side of `axes[1]`.
+        """Make a frame from `points` (3, 3), file's unit: its origin, one on its axis `axes[0]`, one towards `axes[1]`.
 
         `axes` are in cyclic order: "xy", "yz" or "zx". Raises `ValueError` for three points on one line.
         """

@@ -78,7 +78,7 @@ def mesh_step(file: Path, record: SolidMeshRecord, scale: float) -> Source:
 
 
 def declared_unit(content: str) -> float:
-    """The unit of length that the file declares, in mm; millimeters if none."""
+    """Unit of length, in mm, that the `content` of a STEP file declares; 1 if none."""
     text = re.sub(r"\s+", "", content).upper()
     units = [entity for entity in text.split(";") if "LENGTH_UNIT()" in entity]
     # An inch is declared as so many millimeters: the conversion comes first.
@@ -157,7 +157,7 @@ Lengths = TypeVar("Lengths")
 
 
 def mesh_shape(tables: PartTables) -> Source:
-    """Tetrahedra in the shape that the geometry describes, outlines along edges of elements.
+    """Tetrahedra in the shape that `tables.geometry` describes, with edges along the outlines of patches.
 
     Raises `InputError` where the shape cannot be meshed.
     """

@@ -63,16 +63,16 @@ def _stdout_captured() -> Iterator[Callable[[], str]]:
 
 
 def volume_and_surface() -> tuple[float, float]:
-    """Return volume of the model and area of its faces, in the model's units."""
+    """Return volume of the gmsh model and area of its faces, in the model's units."""
     occ = gmsh.model.occ
     faces = gmsh.model.getBoundary(gmsh.model.getEntities(3), combined=True, oriented=False)
     return sum(occ.getMass(*e) for e in gmsh.model.getEntities(3)), sum(occ.getMass(*e) for e in faces)
 
 
 def mesh_model(size: float, metres: float) -> None:
-    """Fill the model with tetrahedra of edge length `size`, finer along curved faces, and bend them to these.
+    """Fill the gmsh model with tetrahedra of edge length `size`, finer along curved faces, and bend them to these.
 
-    `size` is in the model's unit, which has so many `metres`. Raises `InputError` for a shape that gmsh cannot mesh.
+    `size` is in the model's unit of `metres` m. Raises `InputError` for a shape that gmsh cannot mesh.
     """
     problem: object = None
     for finer, smaller in _ATTEMPTS:
@@ -135,12 +135,12 @@ def _growing_field(begin: float, end: float, faces: list[int]) -> int:
 
 
 def own_entities(dim: int = -1) -> list[tuple[int, int]]:
-    """Entities (dimension, tag) of a dimension, or of all, without the copies that partitions have of others."""
+    """Entities (dimension, tag) of dimension `dim`, or of all (−1), without ghosts of the mesh's partitions."""
     return [entity for entity in gmsh.model.getEntities(dim) if not gmsh.model.getType(*entity).startswith("Ghost")]
 
 
 def extract_mesh() -> RawMesh:
-    """The model's volume elements, with the names of its physical groups; of all volumes where no group has any."""
+    """The volume and surface elements and lines of the gmsh model, with the names of its physical groups."""
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
     mesh = RawMesh(np.reshape(coordinates, (-1, 3)))
     number = np.full(int(tags.max(initial=0)) + 1, -1, dtype=np.int64)

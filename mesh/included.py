@@ -30,7 +30,7 @@ DEEPEST = 20
 
 
 class Line(NamedTuple):
-    """A line of a deck: its `text` without the line end, and the `place` that it has, as messages name it."""
+    """A line of a deck: its `text` without the line end, and its `place` for messages, "FILE, line 12"."""
 
     text: str
     place: str
@@ -76,10 +76,10 @@ def included(name: str, file: Path, first: Path) -> Path | None:
 
 
 def lines_of(first: Path, include: Callable[[Iterator[str], str], str | None]) -> Iterator[Line]:
-    """The lines of a deck, those of included files in place of the line that includes them.
+    """Yield the lines of a deck, those of included files in place of the line that includes them.
 
-    `include` gets the lines that follow, and a line: the name of the file that this includes, None if it does not.
-    Raises `InputError` for a file that is missing, includes itself, or is nested too deeply.
+    `include`(following lines, line) returns the name of the file that the line includes, or None. Raises `InputError`
+    for a file that is missing, includes itself, or is nested too deeply.
     """
 
     def of(file: Path, within: tuple[Path, ...]) -> Iterator[Line]:
@@ -110,7 +110,7 @@ def lines_of(first: Path, include: Callable[[Iterator[str], str], str | None]) -
 
 
 def number_of(token: str, place: str) -> float:
-    """A number as Fortran writes it: 1.5, 1.D-3, and Nastran's 1.5-3. Raises `InputError` where `token` is none."""
+    """Read a number as Fortran writes it: 1.5, 1.D-3, and Nastran's 1.5-3. Raises `InputError`, with `place`."""
     try:
         value = float(token)
     except ValueError:
@@ -122,7 +122,7 @@ def number_of(token: str, place: str) -> float:
 
 
 def whole_of(token: str, place: str) -> int:
-    """A whole number. Raises `InputError` where `token` is none."""
+    """Read a whole number. Raises `InputError`, with `place`."""
     try:
         return int(token)
     except ValueError:

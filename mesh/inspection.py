@@ -35,7 +35,7 @@ class PartFace:
     center: Array  # (3,)
     # (3,) by which an interface finds it: the center of a bore or shaft, else a place on it near its center
     point: Array
-    # (3,) outward normal of a plane face, axis of a bore or shaft, mean normal of others; of length one
+    # (3,) unit vector: outward normal of a plane face, axis of a bore or shaft, mean normal of others (zero if none)
     direction: Array
     area: float  # m²
     radius: float | None  # of a bore or shaft, m; None of others
@@ -57,13 +57,13 @@ class Inspection:
     points: Array
     facets: Integers
     face_of: Integers
-    groups: Sequence[str]  # names of volumes and faces in the file
+    groups: Sequence[str]  # names of volumes, faces and sets of nodes in the file
     remarks: Sequence[str]  # on what the file holds besides
-    masses: Sequence[PointMass] = ()  # concentrated ones of the file, as it has them but for their points, m
+    masses: Sequence[PointMass] = ()  # concentrated masses, in the file's unit, their points in m
 
 
 def inspect_part(file: Path, unit: Unit | None = None) -> Inspection:
-    """Read or mesh the part in `file`; its `unit` where that is known.
+    """Read or mesh the part in `file`, whose coordinates are in `unit`; None: as declared, or guessed by the size.
 
     Raises `InputError` for a file that is missing or cannot be read or meshed, and for an unsound mesh.
     """

@@ -31,12 +31,12 @@ _OF_PLACES = set(PlaceRecord.model_fields)  # what else a record of an interface
 
 
 def digest_of_mesh_code() -> str:
-    """SHA-256 of the code that makes meshes and reads them."""
+    """SHA-256 of the Python files that make and read meshes."""
     return digest_of_code(Path(__file__).parent)
 
 
 def geometry_content(geometry: SolidGeometry) -> dict[str, Any]:
-    """The keys of `[geometry]`, the content of a part's file, and of files that it includes, in place of its name."""
+    """The keys of `[geometry]`, with SHA-256 of the part's file, and of those it includes, in place of its name."""
     record = geometry.model_dump(mode="json")
     if geometry.file is not None:
         first, *others = (hashlib.sha256(file.read_bytes()).hexdigest() for file in files_of(geometry.file))
@@ -61,7 +61,7 @@ def kept_path(tables: PartTables) -> Path:
 
 
 def kept_part(path: Path) -> PartMesh | None:
-    """The mesh kept at `path`; None where there is none, or it is damaged, or of another user."""
+    """Read the mesh in the cache at `path`; None where there is none, or it is damaged, or of another user."""
     from .part_mesh import PartMesh
 
     if not is_own(path):
@@ -75,7 +75,7 @@ def kept_part(path: Path) -> PartMesh | None:
 
 
 def keep_part(path: Path, part: PartMesh) -> None:
-    """Keep a mesh at `path`; a cache that cannot be written does no harm."""
+    """Write a mesh to the cache at `path`; nothing happens where that cannot be written."""
     values = {field.name: getattr(part, field.name) for field in fields(part)}
     arrays = {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
     rest = {name: value for name, value in values.items() if name not in arrays}

@@ -18,7 +18,6 @@ from ..common.errors import InputError, blaming_file
 from .cells import in_gmsh_order
 from .source import RawMesh
 
-# Types of cells with their nodes.
 _SOLIDS = {
     "TE4": (4, "tetra"),
     "T10": (10, "tetra10"),
@@ -41,8 +40,8 @@ _WHOLE = "MED_NO_PROFILE_INTERNAL"
 def read_med(path: Path) -> RawMesh:
     """The mesh in a MED file. Groups name regions and faces.
 
-    Raises `InputError` for none, a damaged one, and what cannot be read: several meshes or steps, grids, polyhedra,
-    other coordinates than Cartesian ones.
+    Raises `InputError` for a file without mesh, a damaged one, and what cannot be read: several meshes or steps, grids,
+    polyhedra, other coordinates than Cartesian ones.
     """
     with (
         blaming_file("expected a MED file, found one that cannot be read: {!r}".format),

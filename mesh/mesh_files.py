@@ -44,7 +44,7 @@ _MOST_GROUPS = 1000
 
 
 def read_mesh(path: Path) -> RawMesh:
-    """Read the mesh in `path`, its format given by the ending. Raises `InputError` for what is wrong in it."""
+    """Read the mesh in `path`, whose ending tells the format. Raises `InputError` for what is wrong in it."""
     ending = path.suffix.lower()
     with blaming_file("expected a deck that can be read, found one that cannot: {!r}".format):  # one like no other
         if ending == ".inp":
@@ -68,7 +68,7 @@ def read_mesh(path: Path) -> RawMesh:
 
 
 def read_foreign(path: Path) -> RawMesh:
-    """The mesh in `path` by meshio; `InputError` where it cannot read it.
+    """Read the mesh in `path` by meshio. Raises `InputError` where that cannot.
 
     Integer data of cells, groups and sets of the format name regions and faces; so do sets of nodes.
     """

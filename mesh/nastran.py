@@ -29,9 +29,9 @@ _CONTROL = re.compile(r"\s*CEND\b", re.IGNORECASE)
 
 @dataclass
 class Card:
-    """Bulk data card, or a line of it: `name` in upper case, position, and fields after the name.
+    """Bulk data card, or a line of it: `name` in upper case, `place` for messages, and the fields after the name.
 
-    `begin` and `end` are the marks that tell which line goes on with which.
+    `begin` and `end` are continuation marks: the line that `follows` begins with the mark at the end of another.
     """
 
     name: str
@@ -50,17 +50,17 @@ class Card:
         return self.fields[number] if number < len(self.fields) else ""
 
     def whole(self, number: int, default: int | None = None) -> int:
-        """A whole number in a field. Raises `InputError` where there is none, and no default."""
+        """The whole number in field `number`, `default` where it is empty. Raises `InputError` where it is none."""
         text = self.text(number)
         return default if default is not None and not text else whole_of(text, str(self))
 
     def real(self, number: int) -> float:
-        """A number in a field, 0 where it is empty. Raises `InputError` where it is none."""
+        """The number in field `number`, 0 where it is empty. Raises `InputError` where it is none."""
         return number_of(self.text(number) or "0", str(self))
 
 
 def cards(path: Path) -> Iterator[Card]:
-    """The cards of a deck's bulk data, of included files too.
+    """Yield the cards of a deck's bulk data, of included files too.
 
     Raises `InputError` for a missing included file, a line that continues no card, and replicated cards (=).
     """

@@ -34,7 +34,7 @@ Progress = Callable[[str], None]
 
 
 def kept_or_new(tables: PartTables, progress: Progress, *, remesh: bool) -> PartMesh:
-    """Return `part_mesh`, or its cached result where gmsh would mesh the part again and not `remesh`."""
+    """Return `part_mesh`; of a part that gmsh meshes, an earlier result in the cache unless `remesh`."""
     if not _is_meshed(tables):
         return part_mesh(tables, progress)
     kept = kept_path(tables)

@@ -20,14 +20,14 @@ class PartMesh:
     """A solid part, meshed, in m.
 
     Attributes:
-        points: (p, 3) in m, in the link's frame once `placed`.
+        points: (p, 3) in m, in the link's frame once the part is placed.
         cells: (c, v) points of each cell, in gmsh's order of nodes.
-        cell: their shape.
+        cell: shape of the cells.
         degree: 1 (corners only) or 2 (curved cells: gmsh's 10 or 27 nodes).
-        cell_tag: (c,) which region each cell belongs to.
+        cell_tag: (c,) tag of the region of each cell, 0 of none.
         regions: volume group → its tag, the largest group first.
         facets: (f, 3 or 4) corners of the tagged facets, all of them on the boundary.
-        facet_tag: (f,) which face each belongs to; a facet has one tag.
+        facet_tag: (f,) tag of the face of each.
         faces: name → tag in `facet_tag`; two names may share a face.
         overlaps: volume group → further tags, of its cells that belong to other groups too.
         remarks: what the part's file holds and the link does not, a sentence each.
@@ -47,23 +47,23 @@ class PartMesh:
 
     @property
     def shape(self) -> Cell:
-        """Topology of the cells."""
+        """Corners, facets and edges of a cell."""
         return CELLS[self.cell]
 
     @property
     def corners(self) -> Integers:
-        """Corners (c, 4 or 8) of each cell."""
+        """Corner points (c, 4 or 8) of each cell."""
         return self.cells[:, : len(self.shape.corners)]
 
     @property
     def cell_facets(self) -> Integers:
-        """Corners (f, 3 or 4) of the facets of all cells, cell by cell."""
+        """Corner points (c·m, 3 or 4) of the m facets of every cell, cell by cell."""
         facets = self.shape.facets
         return self.corners[:, facets].reshape(-1, facets.shape[1])
 
     @cached_property
     def facet_numbers(self) -> Integers:
-        """Number (f,) of each of `cell_facets`: the same of those that cells share."""
+        """Number (c·m,) of each of `cell_facets`; a facet that cells share has one number."""
         return np.unique(facet_keys(self.cell_facets, len(self.points)), return_inverse=True)[1].reshape(-1)
 
     def tags_of(self, region: str) -> tuple[int, ...]:
@@ -76,23 +76,23 @@ class PartMesh:
 
 
 def facet_keys(facets: Integers, points: int) -> Integers:
-    """Return numbers (f,) that identify `facets` (f, 3 or 4) of a mesh with that many `points`.
-
-    The three smallest of its corners identify a facet of either shape.
-    """
+    """Numbers (f,) that identify `facets` (f, 3 or 4) of a mesh of so many `points` by their three smallest corners."""
     low = np.sort(facets, axis=1).astype(np.int64)
     return (low[:, 0] * points + low[:, 1]) * points + low[:, 2]
 
 
 def boundary_facets(part: PartMesh) -> tuple[Integers, Integers]:
-    """Return corners (b, 3 or 4) of facets of one cell only, counter-clockwise from outside, and their cells (b,)."""
+    """Corners (b, 3 or 4) of facets of one cell only, counter-clockwise seen from outside, and their cells (b,)."""
     number = part.facet_numbers
     alone = np.flatnonzero(np.bincount(number)[number] == 1)
     return part.cell_facets[alone], alone // len(part.shape.facets)
 
 
 def facet_geometry(points: Array, facets: Integers) -> tuple[Array, Array, Array]:
-    """Centroid (f, 3), m, unit outward normal (f, 3), area (f,), m², of facets; quadrilaterals as two triangles."""
+    """Centroid (f, 3), m, unit normal (f, 3), area (f,), m², of facets (f, 3 or 4) between `points` (p, 3), m.
+
+    Corners run counter-clockwise about the normal; quadrilaterals count as two triangles.
+    """
     fan = [facets[:, [0, k, k + 1]] for k in range(1, facets.shape[1] - 1)]
     vectors = [np.cross(points[t[:, 1]] - points[t[:, 0]], points[t[:, 2]] - points[t[:, 0]]) / 2 for t in fan]
     areas = [np.linalg.norm(vector, axis=1) for vector in vectors]
@@ -105,5 +105,5 @@ def facet_geometry(points: Array, facets: Integers) -> tuple[Array, Array, Array
 
 
 def show(vector: Array) -> str:
-    """Return a point, m, or a direction (3,) in words, without digits below a micrometer."""
+    """Return a point, m, or a direction (3,) as text, without digits below a micrometer."""
     return f"({', '.join(f'{value:.4g}' for value in np.round(vector, 6) + 0.0)})"  # −0 is 0

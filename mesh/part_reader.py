@@ -1,8 +1,7 @@
 """Files of parts, read in a process of its own: what a library does to that process ends with it.
 
-The process takes a pickled function with its arguments, and hands back what comes of it. It starts in an empty folder
-(nothing that lies where a user works is imported) and without what an MPI has left in the environment. It ends with its
-parent, and at a limit of processor time.
+The process starts in an empty folder (nothing that lies where a user works is imported) and without MPI's environment
+variables. It ends with its parent, and at a limit of processor time.
 """
 
 import os
@@ -32,7 +31,7 @@ _is_apart = False  # whether this is such a process
 
 
 def read_apart(read: Callable[..., Found], file: Path, *arguments: object) -> Found:
-    """Call `read(file, *arguments)` in a separate process; a module's function, arguments and result are pickled.
+    """Call `read(file, *arguments)` in a separate process; `read` is of a module, arguments and result pickle.
 
     The time allowed grows with the size of the file. Raises `InputError` where `read` has raised it, or its process has
     crashed, or has not ended in the processor time allowed.
@@ -62,7 +61,7 @@ def read_apart(read: Callable[..., Found], file: Path, *arguments: object) -> Fo
 
 
 def allow(seconds: float) -> None:
-    """Allow a process that reads a part the given seconds of processor time from now on."""
+    """Allow a process of `read_apart` so many `seconds` of processor time from now on; elsewhere do nothing."""
     if not _is_apart:
         return
     with suppress(KeyError, ValueError):
@@ -76,7 +75,7 @@ def allow(seconds: float) -> None:
 
 
 def main() -> None:
-    """Answer the one request on standard input."""
+    """Call the function of `read_apart`, pickled on standard input, and write its pickled result."""
     global _is_apart
     _is_apart = True
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal: the parent decides

@@ -1,11 +1,4 @@
-"""Tables of a link file for geometry, mesh and places, SI units. No mesh library is loaded.
-
-A stepped beam gives `[[geometry.segment]]` tables in place of `section`: each with the `section` that holds from the
-end of the segment before (from the root, for the first) to `until` (m from the root); the last one ends at `length`.
-`[mesh] nodes = [0.0, …, length]` sets the element boundaries of a beam one by one in place of `elements`.
-
-A solid has a `section` as a beam has, drawn out along x, or comes from a `file`.
-"""
+"""Tables of a link file for geometry, mesh and places, SI units. No mesh library is loaded."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -49,7 +42,7 @@ class CircleSection(Record):
 
     @property
     def inner(self) -> float:
-        """The diameter, m, of the hole: none."""
+        """Inner diameter, m: 0."""
         return 0.0
 
 
@@ -67,17 +60,17 @@ SectionRecord = Annotated[RectangleSection | CircleSection | TubeSection, Field(
 
 
 def extents(section: SectionRecord | None) -> tuple[float, float]:
-    """Extents of a section along y and z, m."""
+    """Extents of a section along y and z, m; 0 without section."""
     if isinstance(section, RectangleSection):
         return section.height, section.width
     return (section.outer, section.outer) if section else (0.0, 0.0)
 
 
 class Segment(Record):
-    """A segment of constant section."""
+    """A segment of a beam with constant section."""
 
     until: Positive
-    """End, m from the root; a segment begins at the end of the previous one."""
+    """End, m from the root; a segment begins at the end of the previous one, and the last ends at `length`."""
     section: SectionRecord
     """Cross section."""
 
@@ -137,7 +130,6 @@ class SolidGeometry(Record):
     """STEP file or mesh (.msh, .inp, .bdf, .vtk …) instead of `section`."""
     unit: Literal["m", "mm", "in"] = "m"
     """Unit of the coordinates in `file`."""
-    # Where the link's frame stands in the file's axes: origin in the file's unit, directions of any length.
     origin: Vector3 = (0.0, 0.0, 0.0)
     """Root of the link in the axes of `file`, in its unit."""
     x_axis: Vector3 = (1.0, 0.0, 0.0)
@@ -165,8 +157,7 @@ class SolidMeshRecord(Record):
 class PlaceRecord(Record):
     """A place on a link: where an interface is.
 
-    The faces of `root` and `tip` need no table: they
-    are the plane faces at x = 0 and x = length, unless a table of that name says otherwise.
+    Without tables `root` and `tip` are the plane faces at x = 0 and x = length.
     """
 
     name: Name
@@ -183,12 +174,11 @@ class PlaceRecord(Record):
 class SurfacePatches(Record):
     """Piezoelectric patches outlined in the mesh of a solid, on the faces at its largest or smallest y.
 
-    Same meaning of the keys as in a scene's `[[pzt]]`: centers at (k − ½)·length of link / count, or `centers`.
+    Keys are as in a scene's `[[pzt]]`: centers at (k − ½)·length of link / count, k = 1 … count, or `centers`.
     """
 
     count: PatchCount | None = None
     """Number of patches, evenly spaced; alternative: `centers`."""
-    # m from the root
     centers: Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_PATCHES)] | None = None
     """Centers, m from the root."""
     length: Positive
@@ -207,9 +197,9 @@ class SurfacePatches(Record):
 
 @struct
 class PartTables:
-    """The tables of a link file that make a part."""
+    """Tables of a link file that determine the mesh of a part."""
 
-    path: Path  # of the file: messages name it
+    path: Path  # of the link file: messages name it
     geometry: SolidGeometry
     mesh: SolidMeshRecord = SolidMeshRecord.model_construct()
     places: Sequence[PlaceRecord] = ()  # tables `interface`
@@ -227,14 +217,14 @@ _SIZE = {1: 0.25, 2: 0.6, 3: 1.5}
 
 
 def default_order(cell: CellName) -> int:
-    """Polynomial order of the displacements."""
+    """Default polynomial order of the displacements in cells of this shape."""
     return 3 if cell == "tetrahedron" else 2
 
 
 def default_size(volume: float, surface: float, order: int) -> float:
-    """Edge length for a part of so much `volume` (m³) and `surface` (m²), by the order of the displacements.
+    """Default edge length, m, for a part of `volume` (m³) and `surface` (m²) and displacements of this order.
 
-    Measured by the hydraulic diameter 4 V/A, which is about the smaller side of a solid bar's section, and twice the
+    It is in proportion to the hydraulic diameter 4 V/A: about the smaller side of a solid bar's section, twice the
     thickness of a wall.
     """
     return _SIZE[order] * 4 * volume / surface

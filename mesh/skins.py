@@ -20,7 +20,7 @@ READ = (".3mf", ".dae", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
 
 
 def loaded_skin(path: Path, scale: Sequence[float], d: Array, C: Array) -> trimesh.Trimesh:
-    """The mesh in `path`, m, its coordinates times `scale` (3,), then turned by C (3, 3) and moved by d (3,).
+    """Read the mesh in `path`, its unit `scale` (3,), m, along each axis, turned by C (3, 3) and moved by d (3,), m.
 
     Raises `ModuleNotFoundError` without trimesh, `InputError` if the file is missing, damaged or of another format.
     """
@@ -43,7 +43,7 @@ def loaded_skin(path: Path, scale: Sequence[float], d: Array, C: Array) -> trime
 
 
 def primitive_skin(shape: str, size: Sequence[float], d: Array, C: Array) -> trimesh.Trimesh:
-    """A box of size x, y, z, a cylinder along z (radius, length) or a sphere (radius,), turned by C, moved by d; m."""
+    """Box (x, y, z), cylinder along z (radius, length) or sphere (radius,), m, turned by C (3, 3), moved by d (3,)."""
     from trimesh import creation
 
     made = {

@@ -32,10 +32,10 @@ IN_PLANE = 1e-9
 
 @struct
 class SectionQuadrature:
-    """Quadrature on the part of a cross section that lies in this process's cells."""
+    """Quadrature, by q points, on the part of a cross section that lies in this process's cells."""
 
     cells: Integers  # (q,) local cell of each point
-    X: Array  # (q, 3) its reference coordinates there
+    X: Array  # (q, 3) reference coordinates of the points in these cells
     weights: Array  # (q,) in m²; their sum over all processes is the area of the section
     points: Array  # (q, 3) in m
     y_range: tuple[float, float]  # smallest and largest y of the section, in m; (inf, −inf) where no cell is cut
@@ -46,7 +46,7 @@ def section_quadratures(mesh: Mesh, x: Array, degree: int) -> Iterator[SectionQu
     """Quadrature on each cross section at `x` (k,), m, exact for polynomials of `degree` in the coordinates.
 
     Where faces of cells lie in the plane, the section is that of the material towards larger x; at the end of the part
-    that towards smaller x; beyond it, it is empty. All processes of the mesh, of degree 1 or 2, must call.
+    that towards smaller x; outside the part, it is empty. All processes of the mesh, of degree 1 or 2, must call.
     """
     nodes, coordinates = geometry_nodes(mesh), mesh.geometry.x
     begin, end = _extent(mesh)

@@ -1,8 +1,6 @@
 """From the tables of a link file to a dolfinx mesh with tagged regions and faces. Importing this loads dolfinx.
 
 The part is read or made, checked and its faces found on rank 0; dolfinx distributes it. All ranks raise the same error.
-
-The boundary of the distributed mesh: its facets, and the triangles that a picture shows of it.
 """
 
 from __future__ import annotations
@@ -36,14 +34,14 @@ _COINCIDENT = 1e-6
 
 @struct
 class Surface:
-    """Boundary triangles of the whole part, m, equal on all processes, with the points that each process knows."""
+    """Boundary triangles of the whole part, equal on all processes, and where each process evaluates fields."""
 
     points: Array  # (p, 3) in m; the order does not depend on the number of processes
     triangles: Integers  # (t, 3) rows of `points`, counter-clockwise seen from outside
     edges: Integers  # (e, 2) rows of `points`: the borders of the facets, of which triangles may be a finer division
-    rows: Integers  # (k,) the points that this process evaluates fields at: each belongs to one process
-    cells: Integers  # (k,) local cell of each of these
-    X: Array  # (k, 3) reference coordinates there
+    rows: Integers  # (k,) numbers of the points at which this process does so; each point belongs to one process
+    cells: Integers  # (k,) local cell of each of these points
+    X: Array  # (k, 3) their reference coordinates in it
 
 
 def boundary(mesh: Mesh) -> tuple[Integers, Integers, Integers]:
@@ -63,7 +61,7 @@ def reference_facets(mesh: Mesh) -> Integers:
 
 
 def surface_of(mesh: Mesh) -> Surface:
-    """Triangles on the boundary of `mesh`, several on each facet where the mesh is coarse. All processes call."""
+    """Triangulate the boundary of `mesh`, with several triangles on each facet of coarse ones. Collective."""
     _, cells, which = boundary(mesh)
     count = mesh.comm.allreduce(len(cells))
     n = int(np.clip(np.sqrt(TRIANGLES / max(count, 1)), 1, _FINEST))
@@ -130,7 +128,6 @@ def _gathered(mesh: Mesh, points: Array, triangles: Integers, edges: Integers, c
     mine = np.flatnonzero((first >= begin) & (first < begin + len(points)))
     local = first[mine] - begin
     renumbered = number[all_triangles]
-    # Each begins with its smallest corner, then all are sorted.
     shift = (np.argmin(renumbered, axis=1)[:, None] + np.arange(3)) % 3
     renumbered = np.take_along_axis(renumbered, shift, axis=1)
     renumbered = renumbered[np.lexsort(renumbered.T[::-1])]
@@ -143,10 +140,10 @@ MeshTags = Any  # dolfinx 0.5 and 0.9 name this class differently
 
 @struct
 class SolidMesh:
-    """A solid part as the finite element models take it, in m."""
+    """Mesh of a solid part for its finite element model."""
 
     mesh: Mesh  # of tetrahedra or hexahedra, distributed, without ghost cells; coordinates in m in the link's frame
-    part: PartMesh  # its names and their tags; without points and cells
+    part: PartMesh  # names of regions and faces, and their tags; without points and cells
     cell_tags: MeshTags  # region of every local cell, one of `part.tags_of`; 0 of none
     facet_tags: MeshTags  # the facets of the named faces, all of them on the boundary: `part.faces`
     size: float  # mean extent of the cells along x, in m
@@ -154,9 +151,9 @@ class SolidMesh:
 
 
 def solid_mesh(tables: PartTables, progress: Progress = lambda _: None, *, remesh: bool = False) -> SolidMesh:
-    """Mesh of a solid link, distributed over all processes, which all call; see `part_mesh`.
+    """Mesh of a solid link, distributed over all processes; collective. See `part_mesh`.
 
-    Unless `remesh` a mesh of the same part kept from an earlier run counts. Raises `InputError` on every process.
+    Unless `remesh`, a mesh of the same part from an earlier run is used. Raises `InputError` on every process.
     """
     outcome: PartMesh | FfrobotError | None = None
     comm = MPI.COMM_WORLD

@@ -63,21 +63,21 @@ class RawMesh:
     masses: Sequence[PointMass] = ()  # concentrated ones, which the link does not have either
 
     def add_solids(self, kind: str, cells: Integers, groups: Groups) -> None:
-        """Volume elements (c, v) in gmsh's order of nodes."""
+        """Add volume elements (c, v) of meshio's type `kind`, nodes in gmsh's order, and the groups among them."""
         count = sum(len(block) for _, block in self.blocks)
         self.blocks.append((kind, cells))
         for name, members in groups:
             self.regions.setdefault(name, []).append(count + members)
 
     def add_surfaces(self, corners: Integers, groups: Groups) -> None:
-        """Add triangles or quadrilaterals (k, 3 or 4)."""
+        """Add `corners` (k, 3 or 4) of triangles or quadrilaterals, and the groups among them."""
         self.surfaces.append(corners)
         for name, members in groups:
             self.facet_groups.setdefault(name, []).append(corners[members])
 
 
 def left_out(others: Mapping[str, int], unread: Collection[str]) -> Iterator[str]:
-    """What to say of a deck's `others`, numbers of elements by type, and of what it has that is not read."""
+    """Yield remarks on a deck's elements that are no solids (`others`: numbers by type), and on `unread` keywords."""
     if others:
         listed = ", ".join(f"{count} {kind}" for kind, count in others.items())
         yield f"elements that are not solids are left out, with their stiffness and mass: {listed}"
@@ -89,7 +89,7 @@ def left_out(others: Mapping[str, int], unread: Collection[str]) -> Iterator[str
 class Source:
     """A part, and the groups of facets or points that its file names."""
 
-    part: PartMesh  # not placed yet, no faces named
+    part: PartMesh  # in the file's axes, or placed in the link's frame; no faces named
     facet_groups: Mapping[str, Integers]  # name → (k, 3 or 4) corners
     point_groups: Mapping[str, Integers]  # name → (k,) points
     masses: Sequence[PointMass] = ()  # concentrated ones that the part does not have
@@ -99,7 +99,7 @@ def source_from(raw: RawMesh) -> Source:
     """One mesh from the blocks of `raw`, each cell once.
 
     Raises `InputError` for no volume elements, unsupported or mixed ones, curved hexahedra of 20 nodes, and nodes that
-    are not there or nowhere.
+    are missing or have no finite coordinates.
     """
     kind = _only_kind(raw)
     cell, degree = _SUPPORTED[kind]

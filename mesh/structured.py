@@ -13,10 +13,10 @@ from .part_mesh import PartMesh
 def structured_box(
     length: float, root: tuple[float, float], tip: tuple[float, float], divisions: tuple[int, int, int], cell: CellName
 ) -> PartMesh:
-    """A box along x, 0 … `length` (m), centerd on the axis, of hexahedra, or tetrahedra in their place.
+    """A box along x, 0 … `length` (m), centered on the axis, of hexahedra, or six tetrahedra in place of each.
 
-    `root` and `tip` are height (along y) and width (along z) at the ends, m, between which these change linearly;
-    `divisions` the number of layers along x, y, z.
+    `root` and `tip` are height (along y) and width (along z) at the ends, m, with linear change in between;
+    `divisions` are numbers of hexahedra along x, y, z.
     """
     x, y, z = np.meshgrid(*(np.linspace(0.0, 1.0, n + 1) for n in divisions), indexing="ij")
     height = root[0] + (tip[0] - root[0]) * x
@@ -36,10 +36,10 @@ COINCIDENT = 1e-9
 
 
 def graded_nodes(breakpoints: Sequence[float], elements: int) -> Array:
-    """Return ascending nodes (elements + 1,), m, with a node at each of `breakpoints` (s + 1,).
+    """Return ascending nodes (elements + 1,), m, with a node at each of `breakpoints` (s + 1,), m, of s segments.
 
-    Within a segment the elements are equal; they are shared out so that the longest is as short as possible. A uniform
-    mesh that meets all breakpoints is therefore kept. Raises `ValueError` for fewer elements than segments.
+    Elements of a segment are equal, the longest of all is as short as possible: a uniform mesh that meets all
+    breakpoints stays. Raises `ValueError` for fewer elements than segments.
     """
     lengths = np.diff(np.asarray(breakpoints, dtype=np.float64))
     if elements < lengths.size:
@@ -54,7 +54,7 @@ def graded_nodes(breakpoints: Sequence[float], elements: int) -> Array:
 
 
 def with_points(nodes: Array, points: Sequence[float]) -> Array:
-    """Return `nodes` (m,) and `points` in one ascending list (≥ m,); points that coincide with nodes add nothing."""
+    """Return `nodes` (k,), m, and `points`, m, in one ascending array; points that coincide with nodes add nothing."""
     length = nodes[-1] - nodes[0]
     for point in points:
         if np.min(np.abs(nodes - point)) > COINCIDENT * length:
