@@ -25,7 +25,7 @@ PROCESSES = 4
 
 
 def links() -> Iterator[dict[str, Any]]:
-    """Small links: beams of both theories, boxes of both cells and a round bar, each of the default order."""
+    """Yield keys of small links: beams of both theories, boxes of both cells, a round bar, each of default order."""
     for theory in ("euler-bernoulli", "timoshenko"):
         yield _link({"kind": "beam", "section": SECTION}, {"elements": 2}, model={"theory": theory})
     for cell in ("tetrahedron", "hexahedron"):
@@ -40,7 +40,7 @@ def _link(geometry: Mapping[str, Any], mesh: Mapping[str, Any], **more: object) 
 
 
 def main() -> None:
-    """Compile into the installation or, where nothing can be written there, into the user's cache."""
+    """Compile the forms of `links` into the installation or, where that cannot be written, into the user's cache."""
     if sys.argv[1:] == ["one"]:
         for keys in links():
             computed_modal_body(LinkTable(keys, Path("<forms>")))

@@ -233,7 +233,7 @@ def _up_to_date(path: Path, digest: str, cached: Path) -> ModalBody | None:
 
 
 def is_outdated(path: Path) -> bool:
-    """Whether the link file next to a modal body file, if there is one of its name, makes another modal body now."""
+    """Whether the modal body file LINK.h5 at `path` has a link file LINK.toml beside it that has changed since."""
     with suppress(FfrobotError):
         made_from = read_modal_body(path).input_hash
         return made_from not in ("", input_hash(read_link(path.with_suffix(".toml"))))
@@ -273,7 +273,7 @@ def _digest(record: Mapping[str, Any]) -> str:
 
 
 def restated(body: ModalBody, link: Link) -> ModalBody | None:
-    """Derive the modal body of `link` from one with the same modes; None where it lacks any requested data."""
+    """Derive the modal body of `link` from `body`, one with the same modes; None where this lacks requested data."""
     body = as_computed(body)
     if isinstance(link, BeamLink):  # stresses follow from its stations
         from .beam.stress import beam_stresses  # loads SciPy

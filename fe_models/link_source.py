@@ -11,10 +11,10 @@ from ..common.toml_files import load_toml
 
 @dataclass(frozen=True)
 class LinkTable:
-    """Content of a link file in memory; files that its `keys` name are in the folder of `path`."""
+    """Content of a link file in memory."""
 
     keys: Mapping[str, Any]
-    path: Path  # messages call it so; files that the keys name are in its folder
+    path: Path  # name in messages; files that the keys name are in its folder
 
 
 LinkSource = Path | LinkTable

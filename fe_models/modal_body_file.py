@@ -62,8 +62,7 @@ _UNITS = {"length": "m", "mass": "kg", "first_moment": "kg m", "second_moment": 
 def write_modal_body(path: Path, body: ModalBody, *, in_cache: bool = False) -> None:
     """Write `body` to `path`; an existing file is replaced once the new one is complete.
 
-    A file `in_cache` is for this user alone.
-    Raises `SolveError`, with file and reason, where it cannot be written.
+    A file `in_cache` is for this user alone. Raises `SolveError`, with file and reason, where it cannot be written.
     """
     write_atomically(path, sealed(_image(body)), "modal body file", ours=in_cache, private=in_cache)
 

@@ -35,7 +35,7 @@ IN_PLANE: tuple[Family, ...] = ("in-plane-bending", "axial")
 
 
 def cut(source: LinkSource, count: int, families: Sequence[Family] = IN_PLANE) -> CutLink:
-    """The link of `source` in `count` pieces, with those of the `families` that the link has itself.
+    """Cut the link of `source` into `count` pieces, with modes of those `families` that the link has.
 
     Raises `InputError` where it cannot be cut.
     """

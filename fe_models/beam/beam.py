@@ -1,10 +1,9 @@
 """Beam models: one small eigenproblem for each family of motion of a straight link.
 
-The families of a straight beam with principal axes y and z do not couple. Each gives its stiffness K and mass M over
-its free degrees of freedom, and what the motion is at the stations: all six fields (displacement and rotation of the
-cross section) are continuous piecewise cubics, so cubic Lagrange points hold them exactly. dolfinx assembles K and M
-from weak forms ∫ weight u⁽ⁱ⁾ v⁽ʲ⁾ dx in UFL: a link needs three, with shear six, whatever its families are. Strains at
-Gauss points, which integrate products exactly, are the root of K: K = BᵀB but for round-off. Loads dolfinx.
+The families of a straight beam with principal axes y and z do not couple. All six fields (displacement and rotation of
+the cross section) are continuous piecewise cubics, which values at cubic Lagrange points determine. dolfinx assembles K
+and M from weak forms ∫ weight u⁽ⁱ⁾ v⁽ʲ⁾ dx in UFL: a link needs three, with shear six, whatever its families are.
+Strains at Gauss points, which integrate products exactly, are the root of K: K = BᵀB but for round-off. Loads dolfinx.
 """
 
 from __future__ import annotations
@@ -43,12 +42,12 @@ class FamilyModel:
     fields: Mapping[int, sp.csr_matrix]
 
     def motion(self, places: Sequence[int]) -> Array:
-        """Rows (r, m) of the fields at the stations `places`, one station after the other: translation, rotation."""
+        """Rows (r, m) of the `fields` at the stations `places`, station by station: translations, then rotations."""
         return np.array([values[place].toarray()[0] for place in places for values in self.fields.values()])
 
 
 def family_model(link: BeamLink, family: Family, forms: BeamForms, stations: Array) -> FamilyModel:
-    """The eigenproblem of `family` on the elements of `forms`, read at `stations` (k,), in m."""
+    """Return the eigenproblem of `family` on the elements of `forms`, its fields at `stations` (k,), m."""
     if family in ("axial", "torsion"):
         V = lagrange(forms.nodes, 3)  # K = ∫EA u' v' dx, M = ∫ρA u v dx
         EA, rhoA = rod_properties(link, family, forms.nodes)
@@ -128,7 +127,7 @@ class BeamForms:
     ) -> sp.csr_matrix:
         """Return ∫ weight f⁽ᵈ⁾ g⁽ᵈ⁾ dx, x in m, for weights (e,) of elements: test functions f `of`, trial ones g `by`.
 
-        Without `by` both are the same functions, and so are the derivatives.
+        By default g = f, and both derivatives d are `derivative`.
         """
         by = of if by is None else by
         order = derivative if derivative_by is None else derivative_by

@@ -3,19 +3,10 @@
 The stations are the Gauss–Lobatto points of cubic elements, so values at stations *are* the degrees of freedom of
 the fields and every integral is a product with a mass matrix, without error.
 
-Geometric stiffness is the work of section forces under unit loads when the beam bends, twists and stretches. Let the
-modes say what the curvatures and strains of the sections are, exactly. With the rotations Th = (φ, θ_y, θ_z) and the
-strains Γ = (u', v' − θ_z, w' + θ_y) of the linear beam, sections then turn by the rotation vector Th + ψ and the axis
-moves by r₂ more (R' = R k~, r' = R (e1 + Γ), integrated to second order):
-
-    ψ' = ½ Th × Th'        r₂' = ψ × e1 + ½ Th × (Th × e1) + Th × Γ
-
-By virtual work a unit load with the section forces n, m in the straight link moves along itself by −½ pᵀK p, where
+Geometric stiffness is the work of the section forces n, m of a unit load when the beam bends, twists and stretches
+(docs/theory.md, eq. 48). With the rotations Th = (φ, θ_y, θ_z) and strains Γ = (u', v' − θ_z, w' + θ_y),
 
     pᵀK p = −∫ n·(Th × (Th × e1) + 2 Th × Γ) + m·(Th × Th') dx
-
-K of a moment belongs to the rotation vector. Sections are rigid and the axis keeps its length under twist: what solids
-have besides, N (I_p/A) φ'² of fibers that twist shortens, is left out, as in the rods of Kirchhoff and Reissner.
 """
 
 from collections.abc import Mapping, Sequence
@@ -39,10 +30,8 @@ def shape_integrals(link: BeamLink, stations: Functions, fields: Array) -> Invar
     With displacement (u, v, w) and rotation (φ, θ_y, θ_z) of the section, a point (x, y, z) moves by Φ0 + y Φy + z Φz,
     Φ0 = (u, v, w), Φy = (−θ_z, 0, φ), Φz = (θ_y, −φ, 0); principal axes leave ∫y = ∫z = ∫yz = 0.
 
-    Euler–Bernoulli links are a line of mass on the axis, ∫y² = ∫z² = 0 in all that bends or turns as a whole. Their
-    torsion modes keep their own ρI_p, booked in S̄_33: no planar invariant then holds any rotary inertia, and m_ff =
-    S̄_11 + S̄_22 + S̄_33 stays true. What such a link has of inertia about its own axis, in space, is the spin inertia
-    ½∫ρI_p (ω_1 + φ̇)² dx: J_s = ∫ρI_p, h_s = ∫ρI_p φ, S_s = ∫ρI_p φᵀφ, apart from the integrals over the axis.
+    Euler–Bernoulli links are a line of mass on the axis, ∫y² = ∫z² = 0, with the spin inertia J_s, h_s, S_s about it
+    (eq. 4). S̄_33 includes S_s: no planar invariant then has rotary inertia, and m_ff = S̄_11 + S̄_22 + S̄_33 holds.
     """
     line_mass = link.model.theory == "euler-bernoulli"
     zero = np.zeros_like(fields[U_X])
@@ -87,7 +76,7 @@ def shape_integrals(link: BeamLink, stations: Functions, fields: Array) -> Invar
 
 
 def weighted(link: BeamLink, stations: Functions, moment: str) -> sp.csr_matrix:
-    """Return the matrix (k, k) of ∫ρ·moment·a b dx for two fields a, b at the stations."""
+    """Return the matrix (k, k), SI units, of ∫ρ·moment·a b dx for fields a, b at k stations; `moment`: of `Section`."""
     return gram(stations.root(link.material.density * cellwise(link, stations.nodes, moment)))
 
 
@@ -138,7 +127,7 @@ def _products(values: Array, slopes: Array) -> Array:
 
 
 def section_forces(link: BeamLink, x: Array, interfaces: Mapping[str, float], rotary: Rotary) -> Array:
-    """Return force and moment (6, l, g) at x (g,) in the straight link by unit load, under its reference condition.
+    """Force, N, and moment, N·m (6, l, g), at x (g,), m, by unit load on the straight link in its reference condition.
 
     Loads at the tip act on the section there, too. `rotary`: the inertia of sections that turn, see `ROTARY`.
     """
@@ -164,7 +153,7 @@ def _lever(force: Array) -> Array:
 
 
 def of_tip_support(link: BeamLink, x: Array, at_root: Array) -> Array:
-    """Force, N, and moment, N·m (6, …, g) at x (g,), m, of a tip support with moments `at_root` (6, …, 1 or g)."""
+    """Force, N, and moment, N·m (6, …, g), at x (g,), m, of a tip support that balances moments `at_root`."""
     L, none = link.geometry.length, np.zeros_like(at_root[0])
     return of_load(np.stack([none, -at_root[5] / L, at_root[4] / L, none, none, none]), L - x)
 

@@ -18,7 +18,7 @@ GAUSS = 4
 
 @struct
 class Functions:
-    """Continuous functions on the elements between neighboring nodes, from their degrees of freedom."""
+    """Continuous piecewise polynomials on e elements between neighboring nodes, d degrees of freedom on each."""
 
     nodes: Array  # (e + 1,) ascending, in m
     x: Array  # (size,) where the degrees of freedom are, ascending, in m
@@ -37,7 +37,7 @@ class Functions:
         return np.diff(self.nodes)
 
     def at(self, x: Array, derivative: int = 0) -> sp.csr_matrix:
-        """Return the matrix (k, size) of values, or of a derivative by x, at points x (k,), m, of the axis."""
+        """Return the matrix (k, size) of values, or of the given `derivative` by x, at points x (k,), m."""
         cell = np.clip(np.searchsorted(self.nodes, x, side="right") - 1, 0, len(self.element) - 1)
         return self._within(cell, (x - self.nodes[cell]) / self.lengths[cell], derivative)
 
@@ -51,7 +51,7 @@ class Functions:
         return sp.csr_matrix((shapes.ravel(), (row, self.element[cell].ravel())), shape=(X.size, self.x.size))
 
     def root(self, weight: Array, derivative: int = 0) -> sp.csr_matrix:
-        """B (4e, size) with BᵀB = ∫ weight f⁽ᵈ⁾ g⁽ᵈ⁾ dx, for weights (e,) of the elements, x in m."""
+        """B (4e, size) with BᵀB = ∫ weight f⁽ᵈ⁾ g⁽ᵈ⁾ dx, x in m, for weights (e,) of elements and d = `derivative`."""
         points, weights = leggauss(GAUSS)  # type: ignore[no-untyped-call, unused-ignore]
         elements = len(self.element)
         values = self._within(np.repeat(np.arange(elements), GAUSS), np.tile(0.5 * (points + 1), elements), derivative)
@@ -60,10 +60,10 @@ class Functions:
 
 
 def gram(B: sp.csr_matrix) -> sp.csr_matrix:
-    """BᵀB of a `root`, or of several one upon the other.
+    """BᵀB (m, m) of B (4e, m), made of `Functions.root`.
 
-    Gauss point after Gauss point: what neighboring elements add to an entry is then rounded alike and cancels in rigid
-    motions, where one sum over all leaves a soft elastic foundation.
+    The sum goes Gauss point by Gauss point: contributions of neighboring elements are then rounded alike and cancel in
+    rigid motions, where one sum over all leaves a soft elastic foundation.
     """
     return sum(B[g::GAUSS].T @ B[g::GAUSS] for g in range(GAUSS)).tocsr()
 
@@ -78,7 +78,7 @@ def lagrange(nodes: Array, degree: int) -> Functions:
 
 
 def hermite(nodes: Array) -> Functions:
-    """Cubics, by value and slope at each of `nodes` (e + 1,), m."""
+    """Return cubic Hermite polynomials, by value and slope at each of `nodes` (e + 1,), m."""
     powers = np.array([[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]], dtype=np.float64).T
     element = 2 * np.arange(nodes.size - 1)[:, None] + np.arange(4)
     return Functions(nodes, np.repeat(nodes, 2), element, powers, np.array([0, 1, 0, 1]))

@@ -38,7 +38,7 @@ def modes_of(family: Family, omega2: Array, X: Array) -> list[Mode]:
 
 
 class BeamFlexibility:
-    """K⁻¹ (m, m); factors of K with a unit diagonal, since its entries are in N/m, N and N·m.
+    """K⁻¹ (m, m) of a family, by factors of K scaled to a unit diagonal, since its entries are in N/m, N and N·m.
 
     K = strainᵀ strain but for round-off, which refinement by the strains takes out.
     """
@@ -62,11 +62,10 @@ class BeamFlexibility:
 def attachment_modes(
     model: FamilyModel, family: Family, X: Array, places: Sequence[int], length: float, twists_along: bool
 ) -> list[Mode]:
-    """Attachment modes of a family, beside the eigenmodes X (m, n) that the file has.
+    """Attachment modes of a family, M-orthogonal to its eigenmodes X (m, n) in the modal body.
 
-    `places` are the stations of the interfaces, `length` (m) is that of the link: a unit force goes with a moment of
-    force times length. `twists_along`: whether torsion has the shape under a torque along the link, which bent links
-    bear, too.
+    `places` are the stations of the interfaces, `length` (m) is that of the link: loads are a unit force, and a moment
+    of that times length. `twists_along`: whether a torque distributed along the link, as on bent links, is a load, too.
     """
     units = [1.0 if row < R_X else length for row in model.fields] * len(places)
     loads = [size * load for size, load in zip(units, model.motion(places), strict=True)]
@@ -87,9 +86,9 @@ def attachment_modes(
 
 
 def ritz_modes(model: FamilyModel, family: Family, fixed: Array, static: Array) -> tuple[list[Mode], list[Mode]]:
-    """Modes in the space of fixed-interface modes (m, n) and static shapes (m, r), M-orthonormal together.
+    """Ritz modes in the space of fixed-interface modes (m, n) and static shapes (m, r), M-orthonormal together.
 
-    Those that stand for eigenmodes, and as many others as static shapes.
+    Returns the n that count as eigenmodes, and the r others, of the highest frequencies.
     """
     X, count = np.concatenate([fixed, static], axis=1), fixed.shape[1]
     strain = model.strain @ X
@@ -105,9 +104,8 @@ def lowest_modes(
 
     Assembly rounds K's large entries, of order EI/h³; against the lowest ω² these errors grow as elements⁴. The
     Rayleigh quotient of the strains, which are differences of x once and not twice over (elements²), gives ω² without
-    them, and tells where a mesh is too fine for double precision. `flexibility`: that with the interfaces fixed, where
-    they are. Raises `SolveError` where round-off errors spoil the
-    modes.
+    them, and tells where a mesh is too fine for double precision. `flexibility`: by default K⁻¹; for fixed interfaces,
+    that with these. Raises `SolveError` where round-off errors spoil the modes.
     """
     K, M, strain = model.K, model.M, model.strain
     try:

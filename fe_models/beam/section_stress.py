@@ -38,9 +38,10 @@ def section_stress(record: SectionRecord, section: Section, F: Array, M: Array, 
 
 
 def surface_shear(extent: float, across: float, width: float) -> float:
-    """Mean shear strain along x on a face of a rectangle, over its middle `width` (m), of unit twist (rad/m); in m.
+    """Shear strain along x by twist (1 rad/m), in m: its mean over the middle `width` (m) of a face of a rectangle.
 
-    The face is `across` wide, its opposite `extent` away: γ = −∂Ψ/∂n of Prandtl's function over G φ', by Gauss.
+    The face is `across` (m) wide, the opposite one `extent` (m) away: γ = −∂Ψ/∂n, with Ψ Prandtl's stress function
+    over G φ'.
     """
     nodes, weights = np.polynomial.legendre.leggauss(MEAN_POINTS)  # type: ignore[no-untyped-call, unused-ignore]
     record = RectangleSection(shape="rectangle", height=extent, width=across)

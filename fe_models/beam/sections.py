@@ -17,14 +17,14 @@ def shear_modulus(link: BeamLink) -> float:
 
 
 def rod_properties(link: BeamLink, family: Family, nodes: Array) -> tuple[Array, Array]:
-    """Stiffness (e,), EA in N or GJ in N·m², and mass or moment of inertia per length, of axial or torsional motion."""
+    """Stiffness (e,) EA, N, or GJ, N·m², and inertia (e,) ρA, kg/m, or ρI_p, kg·m, of axial or torsional motion."""
     stiffness, inertia = ("area", "area") if family == "axial" else ("torsion", "I_p")
     modulus = link.material.youngs_modulus if family == "axial" else shear_modulus(link)
     return modulus * cellwise(link, nodes, stiffness), link.material.density * cellwise(link, nodes, inertia)
 
 
 def second_moment(family: Family) -> str:
-    """Which second moment of area works in bending of that family."""
+    """Name in `Section` of the second moment of area for bending of that family."""
     return "I_yy" if family == "in-plane-bending" else "I_zz"
 
 
@@ -39,7 +39,7 @@ def section_property(link: BeamLink, x: Array, name: str) -> Array:
 
 
 def segments(link: BeamLink, x: Array) -> Integers:
-    """Number of the segment at each x, m, of any shape; at a step of the section, of the one beyond it."""
+    """Number, from 0, of the segment at each x, m, of any shape; at a step of the section, of the one beyond it."""
     return np.searchsorted(link.geometry.breakpoints[1:-1], x, side="right")
 
 

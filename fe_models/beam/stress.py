@@ -38,7 +38,7 @@ def beam_stresses(
 
     Bending, axial force, torque and transverse shear: see `section_stress`. Strains by Hooke's law. At a step of the
     section, the section beyond it counts; at a lump, what the beam carries just beyond it. `omega2` (n,) is ω² in
-    rad²/s², of `eigenmodes` and attachment modes; `attached` lumps and `interfaces` have what the modes do there.
+    rad²/s² of so many `eigenmodes`, then of attachment modes; `attached` lumps and `interfaces` have the mode shapes.
     """
     if link.reference.condition == "craig-bampton":
         W, by_name = craig_bampton.interface_loads(omega2, families, omega2.size - eigenmodes, interfaces)

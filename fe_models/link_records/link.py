@@ -49,7 +49,6 @@ class Material(Record):
     """Young's modulus E, Pa."""
     density: Positive
     """Density ρ, kg/m³."""
-    # Beams need it for torsion and shear only, solids always.
     poissons_ratio: Poisson | None = None
     """Poisson's ratio ν; beams need it for torsion and shear only, solids always. G is E/(2(1 + ν)): carbon fibers
     along a tube have less, which a solid with three moduli describes."""
@@ -117,21 +116,17 @@ class Reference(Record):
 
 
 class Modes(Record):
-    """The lowest `count` eigenmodes of one or several families, or those numbered `indices` (1 is the lowest).
-
-    `attachment_modes` adds static shapes of loads at interfaces, and of torques along a bent link, that the eigenmodes
-    do not contain; false: eigenmodes only. The default `count` is then six of each bending family, one axial, one of
-    torsion.
-    """
+    """The lowest `count` eigenmodes of one or several families, or those numbered `indices` (1 is the lowest)."""
 
     count: ModeCount | None = None
-    """Number of the lowest eigenmodes; alternative: `indices`."""
+    """Number of the lowest eigenmodes; alternative: `indices`. Default: six of each bending family, one axial, one of
+    torsion."""
     indices: Annotated[tuple[ModeCount, ...], Field(min_length=1, max_length=MOST_MODES)] | None = None
     """Numbers of the eigenmodes, 1 the lowest."""
     family: Annotated[tuple[Family, ...], Field(min_length=1)] | Family | Literal["all"] = "all"
     """Family or families of the eigenmodes."""
     attachment_modes: bool = True
-    """Addition of static shapes of loads at the interfaces."""
+    """Addition of what eigenmodes lack of static shapes of loads at interfaces, and of torques along a bent link."""
     solver: Solver = "slepc"
     """Solver of the eigenproblem: SLEPc's Krylov–Schur or, of solids, block Lanczos, faster for fine meshes."""
 
@@ -153,7 +148,7 @@ class Damping(Record):
 class StressRecovery(Record):
     """Stress output at named `points` (m, link frame), and on the whole `surface` of a solid.
 
-    The file keeps those of its modes and the static ones of unit loads (docs/theory.md, Stresses).
+    The modal body file has the stresses of modes and the static ones of unit loads (docs/theory.md, Stresses).
     """
 
     points: dict[Name, Vector3] = Field(default_factory=dict)
@@ -208,7 +203,7 @@ class BeamLink(_Link):
 
     @property
     def shapes(self) -> list[SectionRecord]:
-        """The section of each segment."""
+        """The cross section of each segment, from root to tip."""
         records = [segment.section for segment in self.geometry.segment or ()]
         return records if self.geometry.section is None else [*records, self.geometry.section]
 
@@ -225,7 +220,7 @@ class BeamLink(_Link):
 
     @property
     def places(self) -> dict[str, float]:
-        """Every interface, root and tip too, by name: m from the root."""
+        """Position of every interface, root and tip too, by name: m from the root."""
         named = {item.name: item.position for item in self.interface if isinstance(item.position, float)}
         return {"root": 0.0, "tip": self.geometry.length} | named
 
@@ -246,7 +241,7 @@ class SolidLink(_Link):
 
     @property
     def coupling(self) -> Coupling:
-        """How supports of the reference condition constrain the end faces."""
+        """Coupling of the end faces to the supports of the reference condition, "rigid" or "mean"."""
         return self.reference.coupling or ("rigid" if self.reference.holds_root else "mean")
 
     def part(self, path: Path) -> PartTables:
@@ -255,9 +250,9 @@ class SolidLink(_Link):
 
     @property
     def couplings(self) -> dict[str, Coupling]:
-        """Coupling of each interface to its face, "rigid" or "mean"; interior cross sections always by their mean.
+        """Coupling, "rigid" or "mean", of each interface to its face; of interior cross sections always "mean".
 
-        The others follow [reference] where they do not say it themselves; a tip that nothing holds has its mean.
+        By default it is that of [reference]; of a tip without support "mean".
         """
         tip: Coupling = "mean" if self.reference.holds_root else self.coupling
         couplings: dict[str, Coupling] = {"root": self.coupling, "tip": tip}

@@ -23,7 +23,7 @@ class Measured(Record):
 
 @struct
 class MeasuredMode:
-    """One row of the table."""
+    """A row of the table of measured modes."""
 
     line: int  # of the file
     number: int  # of the mode, from 1, the lowest first: among those of `family`, or among all where that is empty

@@ -24,7 +24,7 @@ class Section:
 
 
 def rectangle(height: float, width: float, poissons_ratio: float) -> Section:
-    """Rectangle of `height` along y and `width` along z. k: Cowper 1966, table 1."""
+    """Rectangle of `height` along y and `width` along z, m. Shear coefficient: Cowper 1966, table 1."""
     return Section(
         area=height * width,
         I_yy=width * height**3 / 12,
@@ -37,7 +37,7 @@ def rectangle(height: float, width: float, poissons_ratio: float) -> Section:
 
 
 def tube(outer: float, inner: float, poissons_ratio: float) -> Section:
-    """Tube of diameters `outer` > `inner` ≥ 0; a full circle for inner = 0. k: Cowper 1966, table 1."""
+    """Tube of diameters `outer` > `inner` ≥ 0, m; full for inner = 0. Shear coefficient: Cowper 1966, table 1."""
     moment = pi * (outer**4 - inner**4) / 64
     ring = (1 + (inner / outer) ** 2) ** 2
     hole = (inner / outer) ** 2

@@ -1,13 +1,7 @@
 """Residual attachment modes: what static shapes of interface loads have that the eigenmodes of a link have not.
 
-Under a unit load b at an interface a link bends by K⁻¹b, of which the n eigenmodes X kept (XᵀMX = I) have their part.
-The rest, the residual flexibility,
-
-    R = (I − X Xᵀ M) K⁻¹ B,
-
-is made orthonormal in M and uncoupled in K, and serves as further modes: the flexibility at interfaces is that of the
-whole finite element model, however few eigenmodes there are (MacNeal, Comput. Struct. 1, 1971, 581–601; Rubin, AIAA J.
-13, 1975, 995–1006; Craig and Chang, NASA CR-2885, 1977). NumPy only: beams and solids say what M and strain energy are.
+The residual R = (I − X Xᵀ M) K⁻¹ B of unit loads B at interfaces beside the n eigenmodes X (XᵀMX = I) is made
+orthonormal in M and uncoupled in K, and serves as further modes (docs/theory.md, Attachment modes). NumPy only.
 """
 
 from __future__ import annotations
@@ -41,7 +35,7 @@ COMPONENTS: Mapping[Family, tuple[int, ...]] = {
 
 
 def moving(families: Container[str]) -> list[int]:
-    """Components of loads at interfaces that move modes of these families, ascending."""
+    """Components of loads at interfaces, ascending, forces 0 … 2 and moments 3 … 5, that move modes of `families`."""
     return sorted({k for family in FAMILIES if family in families for k in COMPONENTS[family]})
 
 
@@ -57,7 +51,7 @@ class Inertia:
     total: Callable[[Array], Array]
 
     def without(self, X: Array, U: Array) -> Array:
-        """U less its part in X (m, n), XᵀMX = I; twice, for orthogonality to round-off."""
+        """Return U (m, k) M-orthogonal to X (m, n), XᵀMX = I: its part in X is taken out twice, to round-off."""
         for _ in range(2):
             U = U - X @ self.total(X.T @ self.mass(U))
         return U
@@ -65,23 +59,23 @@ class Inertia:
 
 @struct
 class ModeSet:
-    """Modes, ascending: ω² (n,) in rad²/s², the family of each or of its loads, X (m, n) with XᵀMX = I."""
+    """Modes, ascending: `omega2` ω² (n,) in rad²/s², the family of each or of its loads, X (m, n) with XᵀMX = I."""
 
     omega2: Array
     families: tuple[str, ...]
     X: Array
 
     def followed_by(self, more: ModeSet) -> ModeSet:
-        """These, and others after them."""
+        """Return these modes and, after them, `more`."""
         omega2 = np.concatenate([self.omega2, more.omega2])
         return ModeSet(omega2, (*self.families, *more.families), np.concatenate([self.X, more.X], axis=1))
 
 
 def residual_modes(static: Mapping[Family, tuple[Array, Array]], X: Array, highest: float, inertia: Inertia) -> ModeSet:
-    """Attachment modes from static shapes: by family K⁻¹B and the loads B, both (m, loads).
+    """Attachment modes from `static`: by family the shapes K⁻¹B and the loads B, both (m, loads).
 
-    B are forces, and moments of these times a length; X (m, n) eigenmodes with XᵀMX = I, `highest` their highest ω² in
-    rad²/s², inf where there is none.
+    B are unit forces, and moments of these times a length; X (m, n) are the eigenmodes, XᵀMX = I, `highest` their
+    highest ω² in rad²/s², inf without any.
     """
     known, families = X, list[Family]()
     energies = {family: inertia.total(np.einsum("il,il->l", *pair)) for family, pair in static.items()}  # bᵀK⁻¹b
@@ -129,7 +123,7 @@ def ascending(omega2: Array, family: Integers) -> Integers:
 
 
 def uncoupled(K: Array, of: Integers) -> tuple[Array, Array, Integers]:
-    """Eigenvalues (n,) rad²/s², eigenvectors (n, n), families (n,) of K (n, n) in coordinates of families `of` (n,)."""
+    """Eigenvalues (n,), eigenvectors (n, n), families (n,) of K (n, n), rad²/s²; `of` (n,): families of its rows."""
     apart = of[:, None] != of
     size = np.sqrt(np.diag(K))
     if np.any(np.abs(K)[apart] > (COUPLED * np.outer(size, size))[apart]):
@@ -149,10 +143,9 @@ def interface_loads(
 ) -> tuple[Array, dict[str, Array]]:
     """The loads that bend a link into each of its n modes, as far as they are loads at interfaces.
 
-    W (n, n): the inertia in column k is M times the modes times W[:, k]; and by interface (6, n), force in N and moment
-    in N·m per unit of modal coordinate. K x = ω² M x of an eigenmode x. Of a residual mode r = R c, behind the
-    `eigenmodes`, it is Bc − M X XᵀBc: loads c at the interfaces, and the opposite of the inertia that the eigenmodes
-    have of them; c follows from the work rᵀBc = rᵀKr.
+    Returns W (n, n), rad²/s², and by interface c (6, n), force in N and moment in N·m per unit of modal coordinate: for
+    the modes Y, K Y = M Y W + B c. An eigenmode x has K x = ω² M x. A residual mode r = R c, after so many `eigenmodes`
+    X, has K r = Bc − M X XᵀBc; c follows from the work rᵀBc = rᵀKr.
     """
     W, of = np.diag(omega2), slice(eigenmodes, None)
     W[of, of] = 0.0

@@ -58,14 +58,14 @@ class ModalBody(Integrals, Frozen):
         reference_condition: "cantilever", "simply-supported" or "craig-bampton".
         length: in m.
         frequency: (n,) in Hz.
-        stiffness: (n, n) K_ff = diag(ω²).
+        stiffness: (n, n) K_ff = diag(ω²) in rad²/s².
         modal_mass: (n, n) m_ff = I to 1e-8.
         damping_ratio: (n,) ζ.
         damping_of: "link", or "robot" if ζ refers to the vibrations of the assembled robot.
         family: n names; of a residual attachment mode, that of the loads behind it.
         residual: (n,) 0 of eigenmodes, 1 of residual attachment modes, which come after them; all 0 where not given.
         J_spin: J_s = ∫ρI_p dx in kg·m² of lines of mass about their axis, not in `second_moment`; None: unknown.
-        h_spin: (n,) h_s = ∫ρI_p φ dx, with φ the twist of the modes.
+        h_spin: (n,) h_s = ∫ρI_p φ dx in m·√kg, with φ the twist of the modes.
         S_spin: (n, n) S_s = ∫ρI_p φᵀφ dx; `S_bar_kl` holds it once more at [2, 2], where the plane needs it.
         geometric_stiffness: (n, n) for each unit load, by its name.
         interfaces: by name; `root` and `tip` always.
@@ -80,8 +80,8 @@ class ModalBody(Integrals, Frozen):
         input_hash: of the link file's content.
         modes_hash: of that part of it on which the modes depend; empty where not known.
         ffrobot_version: that made it.
-        assembly: the program that assembled its matrices, with versions; empty where not known.
-        eigensolver: that found its modes, likewise.
+        assembly: program that assembled the matrices, with versions; empty where not known.
+        eigensolver: that of the modes, likewise.
         remarks: omitted content of the part's file, one sentence each.
 
     Raises:
@@ -144,7 +144,7 @@ class ModalBody(Integrals, Frozen):
 
     @property
     def modes_in_words(self) -> str:
-        """Numbers of eigenmodes and attachment modes, in words."""
+        """Numbers of eigenmodes and attachment modes, as text."""
         static = self.mode_count - self.eigenmode_count
         kind = "constraint" if self.reference_condition == "craig-bampton" else "attachment"
         return f"{self.eigenmode_count} modes" + (f" and {static} {kind} modes" if static else "")
@@ -152,10 +152,10 @@ class ModalBody(Integrals, Frozen):
     def interpolate(self, x: float) -> Interface:
         """Mode shapes at the point `x` (m from the root) on the axis.
 
-        If the stations of each element are known (files made here), all six components are the cubic through the
-        four stations of the element: exactly the finite element functions of a beam, of either theory. Otherwise
-        motion along y and z is the cubic Hermite polynomial of (translation, rotation) between two stations, exact for
-        Euler–Bernoulli. Axial motion and twist are then the cubic through the four nearest stations.
+        With `stations.element` all six components are the cubic through the four stations of the element: exactly the
+        finite element functions of a beam, of either theory. Otherwise motion along y and z is the cubic Hermite
+        polynomial of (translation, rotation) between two stations, exact for Euler–Bernoulli; axial motion and twist
+        are the cubic through the four nearest stations.
 
         Raises:
             InputError: x is outside the body.
@@ -164,7 +164,7 @@ class ModalBody(Integrals, Frozen):
         return Interface(position[0], translation[0], rotation[0])
 
     def along_axis(self, x: Array) -> AlongAxis:
-        """Mode shapes at several points `x` (m,) on the axis, m from the root; errors as in `interpolate`."""
+        """Mode shapes at points `x` (q,) on the axis, m from the root; interpolation and errors as in `interpolate`."""
         positions = self.stations.position[:, 0]
         slack = 1e-9 * self.length
         outside = x[~((positions[0] - slack <= x) & (x <= positions[-1] + slack))]

@@ -3,11 +3,9 @@
     u = Σ ψ_c q_c + Σ φ_k η_k
 
 with constraint modes ψ, the static shapes of unit motions of one interface coordinate q while the others rest, and
-eigenmodes φ of the link fixed at all interfaces (R. R. Craig and M. C. C. Bampton, Coupling of substructures for
-dynamic analyses, AIAA J. 6, 1968, 1313–1319). With the frame on the root's section its motion r is that of the frame.
-The others move by d = q − R r beside it, R being their rigid motion. In this frame the link has the modes of the
-floating frame, all p with XᵀMX = I and K = diag(ω²), that span ψ and φ: as many as there are d and η, their highest in
-place of attachment modes. The way back, p = T (d, η), follows from what they do at interfaces.
+eigenmodes φ of the link fixed at all interfaces (docs/theory.md, Craig–Bampton). The frame moves with the root, by r;
+the other interfaces move by d = q − R r relative to it, R being their rigid motion. The link has the modes of the
+floating frame, coordinates p, that span ψ and φ; p = T (d, η) follows from their motion at the interfaces.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -28,10 +26,10 @@ AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 
 def in_order(K: Array, families: Sequence[str], is_static: Sequence[bool]) -> ModeSet:
-    """Return modes in a basis X, XᵀMX = I, of fixed-interface modes and static shapes, in coordinates of the basis.
+    """Ritz modes in the space of fixed-interface modes and static shapes X, XᵀMX = I, in coordinates of these.
 
-    Those that stand for eigenmodes, then as many of each family as loads brought, if the link couples them no more than
-    that. K (n, n) in rad²/s² is XᵀKX; `families` and `is_static` are of the columns of X.
+    First come those that count as eigenmodes, then the highest: of each family, unless the link couples families, as
+    many as it has static shapes. K (n, n) in rad²/s² is XᵀKX; `families` and `is_static` are of the columns of X.
     """
     names: list[str] = [*FAMILIES, LOCAL]
     of = np.array([names.index(family) for family in families])
@@ -53,10 +51,10 @@ ALONE = 1e-12  # eigenvalues of flexibility, each scaled to 1: less is of interf
 
 
 class FixedInterfaceFlexibility:
-    """F − F Bᵀ (B F Bᵀ)⁻¹ B F: displacements under loads with interfaces fixed, which move by the `rows` B (k, m).
+    """F − F Bᵀ (B F Bᵀ)⁻¹ B F: displacements u under loads with interfaces fixed, B u = 0, B (k, m) the `rows`.
 
-    F is the `flexibility`, of a `rank`, under the supports of the root. Of vectors that several processes share each
-    has its own m entries; `total` sums an array over them.
+    F is the `flexibility`, of a `rank`, under the supports of the root. Of vectors that several processes share, each
+    has its own m entries; `total` sums an array over the processes.
     """
 
     def __init__(self, flexibility: Any, rows: Array, total: Callable[[Array], Array] = np.asarray) -> None:
@@ -75,7 +73,7 @@ class FixedInterfaceFlexibility:
 
 @struct
 class InterfaceCoordinates:
-    """Interface coordinates of the modes of a body."""
+    """Interface coordinates d, m and rad, by modal coordinates p of the floating frame."""
 
     names: list[str]  # of the c coordinates d: "tip/y" … "tip/rz", of interfaces other than the root
     rows: Array  # (c, n) d = rows p
@@ -109,7 +107,7 @@ def constraint_modes(omega2: Array, families: Sequence[str], interfaces: Mapping
 def interface_coordinates(
     omega2: Array, families: Sequence[str], static: int, interfaces: Mapping[str, Interface]
 ) -> InterfaceCoordinates:
-    """Return interface coordinates from ω² (n,) in rad²/s² and families of n modes and the number of `static` shapes.
+    """Return interface coordinates from ω² (n,) in rad²/s², families of n modes and the number of `static` shapes.
 
     Raises `InputError` for interfaces so near to each other that they cannot move by themselves.
     """
@@ -133,11 +131,10 @@ def interface_coordinates(
 def interface_loads(
     omega2: Array, families: Sequence[str], static: int, interfaces: Mapping[str, Interface]
 ) -> tuple[Array, dict[str, Array]]:
-    """W (n, n), rad²/s², and by interface loads (6, n), N and N·m, that bend a link into its n modes.
+    """W (n, n), rad²/s², and by interface c (6, n), N and N·m: K X = M X W + B c for the n modes X of a link.
 
-    As `attachment_modes.interface_loads`. K φ = ω² M φ + B c of a fixed-interface mode with reactions c; K ψ = B c of
-    a constraint mode. So in all modes the inertia is that of fixed-interface modes N: KX = M X N Nᵀ Ω² + B c, and Xᵀ of
-    it gives c.
+    As `attachment_modes.interface_loads`. A fixed-interface mode with reactions c has K φ = ω² M φ + B c, a constraint
+    mode K ψ = B c. So W = N Nᵀ Ω², N (n, …) being the fixed-interface modes in X; the product with Xᵀ yields c.
     """
     coordinates = interface_coordinates(omega2, families, static, interfaces)
     W = coordinates.fixed @ (coordinates.fixed.T * omega2)

@@ -1,10 +1,9 @@
 """The lowest modes of a supported link by SLEPc's Krylov–Schur: shift-and-invert at zero. Loads PETSc and SLEPc.
 
-The flexibility F is the inverse of the stiffness under the supports. PETSc sees it as the preconditioner of an exact
-solve, and the mass as a matrix that only multiplies. Modes found before are deflated: a search goes on where it ended,
-and one for what is left tells whether one of several alike is missing, which no single Krylov space shows. SLEPc solves
-for one vector at a time. Block Lanczos (R. G. Grimes, J. G. Lewis and H. D. Simon, SIAM J. Matrix Anal. Appl. 15, 1994)
-solves for several, which reads the factors of a large solid once.
+PETSc sees the flexibility as the preconditioner of an exact solve, and the mass as a matrix that only multiplies. Modes
+found before are deflated: a search goes on where it ended, and one for what is left tells whether one of several alike
+is missing, which no single Krylov space shows. SLEPc solves for one vector at a time, block Lanczos (docs/theory.md,
+Finite elements of a link) for several, which reads the factors of a large solid once.
 """
 
 from __future__ import annotations
@@ -42,18 +41,18 @@ def eigensolver(solver: Solver) -> str:
 
 
 class Product(Protocol):
-    """Product of a matrix with vectors."""
+    """A matrix, known by its product with vectors."""
 
     def __matmul__(self, U: Array) -> Array:
-        """Its product with U (m, k)."""
+        """Product with U (m, k)."""
 
 
 class KrylovSchur:
-    """Search for the lowest eigenpairs; continues from where it stands when more are needed.
+    """Search for the lowest eigenpairs of K x = ω² M x, which goes on where it ended when more are needed.
 
-    Of vectors that several processes share each has its own m `rows`; all take part in everything: `comm` are these
-    processes, `total` sums an array over them. F (m, m) is symmetric, of a `rank`; M (m, m) positive definite.
-    `tolerance`: of θ, the residual of a mode that has converged. `solver` is that of the modes, not of `complete`.
+    `flexibility` F (m, m), K⁻¹ under the supports, is symmetric, of a `rank`; `mass` M positive definite. Of vectors
+    that the processes `comm` share, each has its own m `rows`; `total` sums an array over them. Methods are collective.
+    `tolerance`: residual, relative to θ = 1/ω², of a converged mode. `solver` finds the modes, SLEPc or block Lanczos.
     """
 
     def __init__(
@@ -75,10 +74,7 @@ class KrylovSchur:
         self._X, self._theta = np.empty((rows, 0)), np.empty(0)
 
     def lowest(self, count: int) -> Array:
-        """X (m, count), XᵀMX = I to round-off, ω² ascending.
-
-        Raises `SolveError` as `candidates` does.
-        """
+        """Return the lowest modes X (m, count), XᵀMX = I to round-off, ω² ascending; errors as of `candidates`."""
         X = self.candidates(count)
         while not self.complete(count):
             X = self.candidates(count)
@@ -87,7 +83,7 @@ class KrylovSchur:
     def candidates(self, count: int) -> Array:
         """Return the lowest modes X (m, count), XᵀMX = I; one of several equal ones may lack: `complete` finds it.
 
-        Raises `SolveError` where there are not as many but for round-off, or too few converge.
+        Raises `SolveError` where fewer modes are above round-off, or too few converge.
         """
         if self._theta.size < min(count, self._rank):
             self._add(count - self._theta.size)
@@ -97,7 +93,7 @@ class KrylovSchur:
         return self._X[:, :count]
 
     def complete(self, count: int) -> bool:
-        """Whether the lowest `count` are all there; if not, one more of them is now."""
+        """Whether the lowest `count` modes are all found; if not, one more of them is found now."""
         if self._theta.size >= self._rank or self._blocks(1, LOOSE)[1][0] <= (1 + ALIKE) * self._theta[count - 1]:
             return True
         self._add(1)

@@ -31,7 +31,7 @@ class Lump:
     """A mass, kg, with its inertia (3,), kg·m², on the interface `name`."""
 
     name: str
-    at: Interface  # what the modes do there
+    at: Interface  # mode shapes there
     mass: float
     inertia: Array  # J_x, J_y, J_z about the interface
 
@@ -78,15 +78,15 @@ def with_lumped_masses(integrals: Invariants, attached: Iterable[Lump]) -> Invar
 
 
 def with_added(integrals: Of, added: Mapping[str, Any]) -> Of:
-    """The integrals with more of those of these names."""
+    """Return `integrals` with `added` added to the fields of the same names."""
     return replace(integrals, **{key: getattr(integrals, key) + more for key, more in added.items()})
 
 
 def attached_integrals(m: float, x: Array, E: Array, Phi: Array, phi: Array) -> dict[str, Any]:
-    """Return what a rigid mass adds to the integrals of these names.
+    """Return what a rigid mass adds to the fields of `Invariants`, by name.
 
-    It is m (kg) with its center at x (3,) and E = ∫ρ ξ ξᵀ dV about it. The center moves by Φ p, its points by (φ p) × ξ
-    more; Φ and φ are (3, n).
+    It is m (kg) with its center at x (3,), m, and E (3, 3) = ∫ρ ξ ξᵀ dV, kg·m², about it. The center moves by Φ p, its
+    points by (φ p) × ξ more; Φ and φ are (3, n), m and rad per unit of modal coordinate.
     """
     turn = np.einsum("kab,an->kbn", LEVI_CIVITA, phi)  # (φ × ξ)_k = turn[k, b] ξ_b, each (n,)
     return {

@@ -27,10 +27,10 @@ def modal_body_of(
     geometric_stiffness: Array,
     **others: Any,
 ) -> ModalBody:
-    """The modal body of `link`, its hashes left empty, of `eigenmodes` and attachment modes with ω² (n,), rad²/s².
+    """The modal body of `link`, its hashes left empty, of so many `eigenmodes`, then attachment modes, ω² (n,) rad²/s².
 
-    `integrals` and `geometric_stiffness` (l, n, n) are those of the bare link, without the `attached` lumps; `others`
-    are further fields.
+    `integrals` and `geometric_stiffness` (l, n, n), by unit load, are those of the link without the `attached` lumps;
+    `others` are further fields.
     """
     omega = np.sqrt(omega2)
     return ModalBody(

@@ -37,7 +37,7 @@ class Integrals:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Invariants(Integrals):
-    """Integrals, SI units, with the inertia of lines of mass about their axis; φ is the twist of the modes there."""
+    """Integrals, SI units, with the inertia of a line of mass about its axis; φ (n,) is the twist of the modes."""
 
     J_spin: float  # J_s = ∫ρI_p dx in kg·m²
     h_spin: Array  # (n,) h_s = ∫ρI_p φ dx
@@ -202,7 +202,7 @@ class OutlinedPatches(Frozen):
 
 
 class AlongAxis(NamedTuple):
-    """Modes at m points of the axis: `position` (m, 3), m; `translation` and `rotation` (m, 3, n)."""
+    """Modes at q points of the axis: `position` (q, 3), m; `translation`, `rotation` (q, 3, n) as in `Interface`."""
 
     position: Array
     translation: Array
@@ -210,7 +210,7 @@ class AlongAxis(NamedTuple):
 
 
 def interpolate(stations: Stations, x: Array) -> AlongAxis:
-    """Return the modes at `x` (m,), m from the root, within the stations; see `ModalBody.interpolate`."""
+    """Return the modes at `x` (q,), m from the root, within the stations; see `ModalBody.interpolate`."""
     element = stations.element
     if element is None:
         return _hermite(stations, x)
@@ -220,7 +220,7 @@ def interpolate(stations: Stations, x: Array) -> AlongAxis:
 
 
 def through(stations: Stations, members: Integers, x: Array) -> AlongAxis:
-    """The polynomials through the stations `members` (m, i), at x (Lagrange)."""
+    """Modes at x (q,), m, by Lagrange polynomials through the stations of these numbers, `members` (q, i)."""
     nodes = stations.position[members, 0]
     others = ~np.eye(nodes.shape[1], dtype=bool)
     ratios = (x[:, None, None] - nodes[:, None, :]) / (nodes[:, :, None] - nodes[:, None, :] + ~others)

@@ -21,18 +21,18 @@ MOTIONS = 12  # unit loads of inertia, which come before those at interfaces
 
 
 def interface_load_names(interfaces: Iterable[str]) -> list[str]:
-    """Names of the loads at interfaces, six of each: forces, then moments."""
+    """Names of the unit loads at interfaces, six at each: force/NAME/x … z, then moment/NAME/x … z."""
     return [f"{kind}/{name}/{axis}" for name in interfaces for kind in ("force", "moment") for axis in "xyz"]
 
 
 def unit_load_names(interfaces: Iterable[str]) -> list[str]:
-    """Names of the unit loads of a link with these interfaces."""
+    """Names of the unit loads of a link: 12 of inertia, t_x … omega_yz, then those at the interfaces."""
     motions = [f"{kind}_{axis}" for kind in "tr" for axis in "xyz"] + [f"omega_{pair}" for pair in PAIRS]
     return motions + interface_load_names(interfaces)
 
 
 def loads_at(names: Sequence[str], interface: str) -> slice:
-    """Which of the unit loads `names` are at an interface: three forces, then three moments."""
+    """Place among the unit loads `names` of those at an interface: three forces, then three moments."""
     first = names.index(f"force/{interface}/x")
     return slice(first, first + 6)
 

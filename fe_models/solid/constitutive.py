@@ -23,7 +23,7 @@ def stiffness(material: Material | OrthotropicMaterial) -> Array:
 
 
 def is_stable(material: OrthotropicMaterial) -> bool:
-    """Whether every strain stores energy: its normal compliance is positive definite."""
+    """Whether every strain stores energy: the compliance of normal strains is positive definite."""
     return bool(np.linalg.eigvalsh(_normal_compliance(material.youngs_modulus, material.poissons_ratio))[0] > 0)
 
 

@@ -44,7 +44,7 @@ class MaterialMap:
 
 @struct
 class ScalarMass:
-    """M_ab = ∫ρ N_a N_b dV over the nodes."""
+    """Mass matrix M_ab = ∫ρ N_a N_b dV, kg, of shape functions N_a at the nodes."""
 
     matrix: PETSc.Mat
 
@@ -97,7 +97,7 @@ class SolidModel:
         return result
 
     def to_owners(self, parts: Array) -> Array:
-        """Return (r, owned) of (r, owned + ghosts), any unit: what all processes have for a node, added; collective."""
+        """Sum `parts` (r, owned + ghosts), any unit, over the processes that share a node: (r, owned); collective."""
         if self.comm.size == 1:
             return parts
         seen = np.arange(parts.shape[1], dtype=PETSc.IntType)
@@ -127,7 +127,7 @@ class SolidModel:
 class MassMatrix:
     """Mass operator M u + Σ Bᵀ diag(w) B u: the mesh, and masses attached to interfaces.
 
-    `attached` has for each such mass B (6, 3 owned), the mean motion of its interface, and w (6,), its weights.
+    `attached` has for each such mass B (6, 3 owned), the mean motion of its interface, and w (6,), kg and kg·m².
     """
 
     def __init__(self, model: SolidModel, attached: Sequence[tuple[Array, Array]]) -> None:
@@ -144,7 +144,7 @@ class MassMatrix:
 def material_map(
     mesh: Mesh, material: AnyMaterial, regions: Sequence[tuple[NDArray[np.int32], AnyMaterial]] = ()
 ) -> MaterialMap:
-    """Return `material` for all cells but those (of this rank, ghosts too) of each of `regions`."""
+    """Return the `material` of all cells of this rank, ghosts too, but those of `regions`: (cells, their material)."""
     cells = mesh.topology.index_map(3)
     of_cell = np.zeros(cells.size_local + cells.num_ghosts, dtype=np.int64)
     for number, (members, _) in enumerate(regions, start=1):
@@ -155,7 +155,7 @@ def material_map(
 
 
 def solid_model(mesh: Mesh, order: int, materials: MaterialMap) -> SolidModel:
-    """Spaces, mass matrix and stiffness form of a solid; `stiffness_matrix` then assembles."""
+    """Return space, mass matrix and stiffness form of a solid, displacements of `order`, for `stiffness_matrix`."""
     V, S = function_space(mesh, order, (3,)), function_space(mesh, order)
     nodes = node_map(V)
     assert np.array_equal(nodes, node_map(S)), "scalar and vector space number their nodes alike"
@@ -183,7 +183,7 @@ def solid_model(mesh: Mesh, order: int, materials: MaterialMap) -> SolidModel:
 
 
 def stiffness_matrix(model: SolidModel, fixed: Sequence[Any] = ()) -> PETSc.Mat:
-    """K, upper triangle in 3 × 3 blocks; rows and columns of the boundary conditions `fixed` are those of identity."""
+    """Assemble K, N/m, upper triangle in 3 × 3 blocks; rows and columns of boundary conditions `fixed` are identity."""
     K = PETSc.Mat().create(model.comm)
     size = (3 * model.owned, 3 * model.V.dofmap.index_map.size_global)
     K.setSizes((size, size), 3)

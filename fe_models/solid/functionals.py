@@ -52,7 +52,7 @@ class Averages:
     density: Array
 
     def of(self, model: SolidModel, modes: Array) -> tuple[Array, Array]:
-        """Return translation, m, and rotation, rad, (k, 3, n) of `modes` (3 owned, n); collective."""
+        """Return mean translation, m, and rotation, rad, (k, 3, n) each, of `modes` (3 owned, n); collective."""
         n = modes.shape[1]
         moments = model.total(self.weights @ model.with_ghosts(modes).reshape(-1, 3 * n)).reshape(-1, 4, 3, n)
         translation = moments[:, 0] / self.area[:, None, None]
@@ -155,8 +155,8 @@ def outlined_patches(
     work ∫ N t·δε t ds. One whose width is fixed does the same along e_z, which bends the link back by ν: its N is
     1/(1 − ν) times as large.
 
-    `faces` has the tags, among `facet_tags`, of "patch/K/top" and "patch/K/bottom", K from 0, where the record has
-    them; `length` (m) is that of the link, `modes` (dofs, n) with ghosts.
+    `faces` has the tags, among `facet_tags`, of "patch/K/top" and "patch/K/bottom", K from 0; `length` (m) is that of
+    the link, `modes` (3 (owned + ghosts), n).
     """
     edges, mesh, v = record.edges(length), space.mesh, ufl.TestFunction(space)
     forces: dict[str, Array] = {}

@@ -4,13 +4,9 @@ With displacements and coordinates in the same space, every integral of docs/the
 matrix: x is its own nodal interpolation, so nothing is lumped and nothing is approximated.
 
 An interface that turns by φ moves a point at d from its center by φ × d and, to second order, by ½ φ × (φ × d). Its
-mean displacement and rotation, which are linear in u, read the latter too: a section that turns about two axes across
-seems to turn about the third. The tractions t of a unit load on an interface do work on it, T = ∫ t dᵀ ds,
-
-    ∫ t · ½ φ × (φ × d) ds = ½ (φᵀ T φ − tr T φᵀφ)
-
-and −½ pᵀK p of the load, K = ∫ σ⁰ ∂Φ ∂Φ dV, is the work on both. Without it K belongs to the displacement of the
-interface's center and to the rotation vector of its section, by which the equations of motion place it.
+mean displacement and rotation, which are linear in u, include the latter. Without the work on it of the tractions t of
+a unit load, T = ∫ t dᵀ ds (docs/theory.md, eq. 49), geometric stiffness belongs to the displacement of the interface's
+center and to the rotation vector of its section, by which the equations of motion place it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -78,10 +74,9 @@ def prestressed(
 ) -> Array:
     """Return geometric stiffness (l, n, n) of `modes` (3 owned, n) by unit load; collective.
 
-    It is that for centers and rotation vectors of the interfaces. `loads` and `shapes` (3 owned, l) are nodal forces,
-    N, and displacements, m, of the unit loads, `rows` B (6, 3 owned) the mean motion of each interface, which spreads
-    loads on it. `supports`: components of the mean motion that are fixed, in the order of `flexibility.B`; none of
-    rigid faces.
+    It belongs to centers and rotation vectors of the interfaces. `loads` and `shapes` (3 owned, l) are nodal forces,
+    N, and displacements, m, of the unit loads, `rows` B (6, 3 owned) the mean motion of each interface, whose transpose
+    spreads loads on it. `supports`: fixed components of the mean motion by interface, in the order of `flexibility.B`.
     """
     total = geometric_stiffness(flexibility.model, modes, shapes)
     T = _of_spread_loads(flexibility, loads, rows, interfaces, supports)

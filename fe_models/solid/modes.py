@@ -47,9 +47,9 @@ def wanted_modes(
 ) -> ModeSet:
     """Compute the modes that `link.modes` selects; collective. `read`: `section_motion` of modes (3 owned, n), m.
 
-    The search for the lowest modes goes on until the wanted ones are among them; for how many more follows from the
-    share of wanted ones so far. Raises `InputError` for more than the mesh has, or than can be found in reasonable
-    time; `SolveError` where modes are lost in round-off.
+    The search for the lowest modes goes on until the wanted ones are among them. Raises `InputError`, which names
+    `where`, for more than the mesh has, or than can be found in reasonable time; `SolveError` where modes are lost in
+    round-off.
     """
     family, model = "all" if link.modes.family == "all" else link.families, mass.model
     numbers = np.array(link.modes.indices or range(1, (link.modes.count or 0) + 1)) - 1
@@ -125,7 +125,7 @@ def section_motion(
     rotation: Array,
     attached: Sequence[tuple[Array, Array]],
 ) -> list[Array]:
-    """Motion (rows, n) of the sections by family, in order of `FAMILIES`, whose sums of squares are kinetic energies.
+    """Motion (rows, n) of the sections, m·√kg, for each of `FAMILIES`: sums of squares are shares of kinetic energy.
 
     Sections at x (k,), m, stations of `element` (e, 4), move by `translation` (k, 3, n), m, and `rotation`, rad;
     `attached`: of each mass on an interface the motion there (6, n), and its weights (6,), kg and kg·m².
@@ -142,7 +142,7 @@ def section_motion(
 
 
 def names(motion: Sequence[Array]) -> list[str]:
-    """Family of each mode, by the motion (rows, n) of the sections in each family."""
+    """Family of each mode, by `section_motion` (rows, n) in each family; "local" where sections move little."""
     share = np.array([np.sum(rows**2, axis=0) for rows in motion])
     total, first = share.sum(axis=0), share.argmax(axis=0)
     return [FAMILIES[i] if whole >= 0.5 else LOCAL for whole, i in zip(total, first, strict=True)]
@@ -152,8 +152,7 @@ def aligned(omega2: Array, motion: Sequence[Array], wanted: Sequence[str] | str)
     """Return Q (n, n), orthogonal, that rotates modes of equal frequency to the families: a reproducible basis.
 
     `omega2` (n,) in rad²/s² is ascending, `motion` (rows, n) that of the sections by family. For `wanted` families (not
-    "all") modes of nearly equal frequency are turned too: into Ritz vectors, of which one has all that the cluster has
-    of a family.
+    "all") modes of nearly equal frequency are combined, too: all motion in a family is then in one of them.
     """
     Q = np.eye(omega2.size)
     gap = REPEATED if wanted == "all" else NEARLY
@@ -186,8 +185,8 @@ def attachment_modes(
 ) -> ModeSet:
     """Return attachment modes of the loads at so many `interfaces` that belong to `families`; collective.
 
-    `loads` (3 owned, l), N, and `shapes`, m, are those of `invariants.unit_loads` and `static_shapes`; `mass` has
-    what is attached; `length` and `twists_along` as of `beam.modes.attachment_modes`.
+    `loads` (3 owned, l), N, and `shapes`, m, are those of `invariants.unit_loads` and `static_shapes`, `modes` the
+    eigenmodes; `length`, m, and `twists_along` are as in `beam.modes.attachment_modes`.
     """
     model, scale = mass.model, np.repeat([1.0, length], 3)
     static = {}
@@ -203,6 +202,6 @@ def attachment_modes(
 
 
 def ritz_modes(model: SolidModel, both: ModeSet, count: int) -> ModeSet:
-    """Modes in the space of `count` fixed-interface modes and static shapes behind them, in that order; collective."""
+    """Ritz modes, as `in_order`, in the space `both`: `count` fixed-interface modes, then static shapes; collective."""
     ritz = in_order(strain_energy(model, both.X), both.families, [k >= count for k in range(len(both.families))])
     return ModeSet(ritz.omega2, ritz.families, both.X @ ritz.X)

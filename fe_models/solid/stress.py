@@ -37,9 +37,9 @@ NEWTON_STEPS = 10
 
 
 def modal_strains(space: FunctionSpace, cells: Integers, X: Array, modes: Array) -> Array:
-    """Return strains (q, 6, n) ε_xx, ε_yy, ε_zz, 2ε_yz, 2ε_xz, 2ε_xy of modes at points of cells.
+    """Return strains (q, 6, n) ε_xx, ε_yy, ε_zz, 2ε_yz, 2ε_xz, 2ε_xy of modes, per unit of each, at points of cells.
 
-    `cells` (q,) of this process, X (q, 3) reference coordinates in them, `modes` (dofs, n) with ghosts.
+    `cells` (q,) of this process, X (q, 3) reference coordinates in them, `modes` (3 (owned + ghosts), n).
     """
     element, nodes = lagrange_element(space), node_map(space)
     n = modes.shape[1]
@@ -61,17 +61,17 @@ def _symmetric(gradient: Array) -> Array:
 
 
 def jacobians(mesh: Mesh, cells: Integers, X: Array) -> Array:
-    """Return J (q, 3, 3) = ∂x/∂X at reference coordinates X (q, 3) in each of `cells` (q,)."""
+    """Return J (q, 3, 3) = ∂x/∂X, m, at reference coordinates X (q, 3), one point in each of `cells` (q,)."""
     shapes = coordinate_element(mesh).tabulate(1, X)[1:, :, :, 0]
     corners = mesh.geometry.x[geometry_nodes(mesh)[cells]]
     return np.einsum("kqv,qvi->qik", shapes, corners)
 
 
 def locate(mesh: Mesh, points: Array, slack: float) -> tuple[Integers, Integers, Array]:
-    """All cells owned by this process that contain each of `points` (k, 3), m.
+    """Find the cells owned by this process that contain `points` (k, 3), m, a point in none, one or several.
 
-    For each hit the point (h,), the cell (h,) and the reference coordinates X (h, 3); `slack` is how far outside its
-    cell a point may be, in X. Curved cells are inverted by Newton's method.
+    Returns for each of h hits the number of the point (h,), the cell (h,) and reference coordinates X (h, 3). `slack`
+    is how far outside its cell a point may be, in X. Curved cells are inverted by Newton's method.
     """
     owned = mesh.topology.index_map(3).size_local
     corners = mesh.geometry.x[geometry_nodes(mesh)]
@@ -117,7 +117,7 @@ def recovered_stresses(
 ) -> dict[str, Any]:
     """Compute the stresses that a link file requests: `stress` … `surface_static` of its `ModalBody`.
 
-    `modes` (3 (owned + ghosts), n); `shapes` (3 owned, l) static displacements of unit loads; `surface` (p, 3) points.
+    `modes` (3 (owned + ghosts), n); `shapes` (3 owned, l), m, under unit loads; `surface` (p, 3), m, points there.
     """
     if not (link.stress.points or link.stress.surface):
         return {}
@@ -141,8 +141,8 @@ def point_stresses(
 ) -> dict[str, StressPoint]:
     """Modal stresses and strains at named points, m.
 
-    C (6, 6), or (cells, 6, 6) for the cells of this process, in Pa, as in `constitutive.stiffness`; `modes` (dofs, n)
-    with ghosts. Raises `InputError` for a point outside the part, on every process.
+    C (6, 6), or (cells, 6, 6) for the cells of this process, in Pa, as in `constitutive.stiffness`; `modes` (3 (owned +
+    ghosts), n). Raises `InputError` for a point outside the part, on every process.
     """
     positions = np.array(list(points.values()), dtype=np.float64).reshape(-1, 3)
     count, strain, stress = _averages(space, C, modes, positions)
@@ -208,13 +208,13 @@ VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 
 @struct
 class Gradients:
-    """Displacement gradients of k fields in some cells."""
+    """Displacement gradients of k fields at q quadrature points of each of c cells."""
 
-    cells: slice  # which, of this rank's own
+    cells: slice  # which of this rank's own
     weights: Array  # (c, q) quadrature weight times volume in m³
     values: Array  # (c, 3, q, 3, k): ∂u_i/∂x_j at [:, j, :, i]
     inverse: Array  # (c, 1 or q, 3, 3) ∂X_a/∂x_j at [:, :, j, a]
-    shapes: Array  # (3, q, d) slopes of the shape functions on the reference cell
+    shapes: Array  # (3, q, d) slopes of the d shape functions on the reference cell
 
     def forces(self, stress: Array) -> Array:
         """Return ∫ σ : ∇N_a dV (c, d, 3, k), N, at nodes of each cell, of stresses (c, 6, q, k) times weights, N·m."""
@@ -243,7 +243,7 @@ class Gradients:
 
 
 def gradients(model: SolidModel, fields: Array) -> Iterator[Gradients]:
-    """Gradients of `fields` (3 owned, k), m, in all cells that this rank owns, a chunk at a time; collective."""
+    """Yield gradients of `fields` (3 owned, k), m, in all cells that this rank owns, chunk by chunk; collective."""
     mesh, k = model.mesh, fields.shape[1]
     if not k:
         return
@@ -277,7 +277,7 @@ def _at_points(inverse: Array, gradient: Array) -> Array:
 
 
 def strain_energy(model: SolidModel, modes: Array) -> Array:
-    """Return K_ff (n, n) = ∫ ε(Φ_i) : C : ε(Φ_j) dV of `modes` (3 owned, n), J per unit of two of them; collective."""
+    """Return K_ff (n, n) = ∫ ε(Φ_i) : C : ε(Φ_j) dV, J, of displacements Φ (3 owned, n), m; collective."""
     n = modes.shape[1]
     total: Array = np.zeros((n, n))
     for piece in gradients(model, modes):
@@ -287,7 +287,7 @@ def strain_energy(model: SolidModel, modes: Array) -> Array:
 
 
 def internal_forces(model: SolidModel, fields: Array) -> Array:
-    """Return K u (3 owned, k), N, of displacements `fields` (3 owned, k), m, from strains; collective."""
+    """Return K u (3 owned, k), N, for displacements u = `fields` (3 owned, k), m, by their strains; collective."""
     k, nodes, index = fields.shape[1], node_map(model.V), model.V.dofmap.index_map
     total = np.zeros((index.size_local + index.num_ghosts, 3 * k))
     for piece in gradients(model, fields):

@@ -1,16 +1,10 @@
 """How a solid is fixed, and its flexibility F: the displacements u = F f under loads f, with the supports in place.
 
-Rigid faces (RBE2) move by q (six numbers about their centroid). Their nodes are clamped in the factorized matrix K_0
-and q comes back by static condensation (Craig and Bampton, 1968): with W the displacements under unit q and S = WᵀKW,
+    F = P (K_0⁻¹ + W S⁻¹ Wᵀ) Pᵀ,   S = WᵀKW,   P = I − R (B R)⁻¹ B
 
-    G = K_0⁻¹ + W S⁻¹ Wᵀ
-
-Mean supports B u = 0 leave K singular: six springs, on degrees of freedom that hold the body isostatically, make it
-positive definite, and loads in equilibrium leave them unloaded. With R the rigid motions and P = I − R (B R)⁻¹ B,
-
-    F = P G Pᵀ
-
-so that only sparse symmetric positive definite matrices are factorized and B never fills one.
+(docs/theory.md, eq. 8) with rigid faces (RBE2) clamped in K_0, W the displacements under their unit motions, six
+springs in K_0 in place of mean supports B u = 0, and rigid motions R of the body: only sparse symmetric positive
+definite matrices are factorized and B never fills one.
 
 Factors are MUMPS' Cholesky factors of an upper triangle, in memory or, of large ones, in files.
 """
@@ -49,7 +43,7 @@ COLUMNS = 32
 
 
 class Factors:
-    """K = L Lᵀ, ordered by MUMPS' own PORD. Vectors hold this rank's own degrees of freedom.
+    """Cholesky factors of K by MUMPS. Vectors hold this rank's own degrees of freedom.
 
     K is an upper triangle, which is destroyed. Raises `SolveError` where it is not positive definite in double
     precision, or memory or disk does not suffice.
@@ -83,7 +77,7 @@ class Factors:
             used.destroy()
 
     def solve(self, loads: Array) -> Array:
-        """K⁻¹ f (own, k), m, of loads f (own, k), N, as many columns at once as MUMPS takes well; collective."""
+        """Return K⁻¹ f (own, k), m, for `loads` f (own, k), N; collective."""
         result = np.empty_like(loads)
         for start in range(0, loads.shape[1], COLUMNS):
             part = slice(start, start + COLUMNS)
@@ -138,7 +132,7 @@ class RigidFace:
         name: of the interface.
         nodes: (f,) its nodes among this rank's own.
         centroid: (3,) in m.
-        free: (k,) which of its translations (0 … 2) and rotations (3 … 5) no support holds.
+        free: which of its translations (0 … 2) and rotations (3 … 5) no support fixes.
     """
 
     name: str
@@ -148,10 +142,10 @@ class RigidFace:
 
 
 class Flexibility:
-    """Factorized once, applied often; see the module. Vectors hold this rank's own degrees of freedom.
+    """Flexibility F of the supported solid, `F @ loads`. Vectors hold this rank's own degrees of freedom.
 
-    `faces` are rigid ones; B (6, 3 owned) rows of the mean supports, None where the rigid faces hold the body. Raises
-    `SolveError` where the supported stiffness is not positive definite.
+    `faces` are the rigid ones; B (6, 3 owned) rows of the mean supports, None where rigid faces support the body.
+    Raises `SolveError` where the supported stiffness is not positive definite.
     """
 
     def __init__(self, model: SolidModel, faces: Sequence[RigidFace], B: Array | None) -> None:
@@ -208,7 +202,7 @@ class Flexibility:
         return int(total + self.W.shape[1] - (0 if self.B is None else len(self.B)))
 
     def release(self) -> None:
-        """Free the factors: no loads after that; collective."""
+        """Free the factors, after which nothing can be solved; collective."""
         self._factor.release()
 
     def reactions(self, loads: Array) -> Array:
@@ -218,7 +212,7 @@ class Flexibility:
         return -self._BR_inverse.T @ self.model.total(self.R.T @ loads)
 
     def supported(self, loads: Array) -> Array:
-        """Pᵀ f (3 owned, k), N: `loads` with the forces of mean supports."""
+        """Return `loads` (3 owned, k), N, with the reactions of mean supports added."""
         return loads if self.B is None else loads + self.B.T @ self.reactions(loads)
 
 
