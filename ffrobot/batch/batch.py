@@ -29,7 +29,7 @@ TRIES = 3  # executors in a row that break before any job is done
 
 
 class Batch:
-    """The jobs of a command, by an executor that `make` starts with the first of them and where one has broken."""
+    """The jobs of a command, done by an executor; `make` starts one for the first job, and after one has broken."""
 
     def __init__(self, make: Callable[[], Executor]) -> None:
         self._make = make
@@ -47,9 +47,9 @@ class Batch:
             self._executor.shutdown(cancel_futures=True)
 
     def results(self, function: Callable[[J], R], jobs: Sequence[J]) -> Iterator[tuple[int, R]]:
-        """Number and result of every job, in the order in which they end; jobs of killed processes are done again.
+        """Yield number and result of every job, in the order in which they end; jobs of killed processes run again.
 
-        Raises what `function` raises, and `SolveError` where those who do the jobs are gone.
+        Raises what `function` raises, and `SolveError` where executors keep breaking.
         """
         left, broken = dict(enumerate(jobs)), 0
         while left:
@@ -85,13 +85,13 @@ def _done(version: str, function: Callable[[J], R], job: J) -> R:
 
 
 class Processes(ProcessPoolExecutor):
-    """`count` processes, forked from this one with the modules and models that it has."""
+    """Executor with `count` processes, forked from this one with the modules and models that it has."""
 
     def __init__(self, count: int) -> None:
         super().__init__(count, mp_context=get_context("fork"), initializer=_serve, initargs=(os.getpid(),))
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the processes; runs under way are asked to end."""
+        """End the processes, and ask runs under way to end."""
         for process in list((self._processes or {}).values()):
             process.terminate()
         super().shutdown(wait, cancel_futures=cancel_futures)
@@ -123,10 +123,10 @@ def _leave() -> NoReturn:
 
 @contextmanager
 def batch_of(count: int | None = None, scheduler: str | None = None) -> Iterator[Batch]:
-    """A batch by `count` processes here, by default one for each processor, or by workers of a dask `scheduler`.
+    """Context of a batch for `count` processes, by default one for each processor, or workers of a dask `scheduler`.
 
-    Under mpirun by its processes, all of which call this: the first has the batch, the others do its jobs and end.
-    Raises `InputError` for two of these at once, and a scheduler that nobody answers at.
+    Under mpirun its processes do the jobs, and all call this: the first has the batch, the others serve it and end.
+    Raises `InputError` for two of these at once, and for a scheduler that does not answer.
     """
     if processes() > 1 and (count or scheduler):
         option = "--processes" if count else "--scheduler"

@@ -32,7 +32,7 @@ class Done(NamedTuple):
 
 
 class Worker:
-    """One such process, with the environment and in the folder of its making."""
+    """A process `ffrobot.worker`, with the folder and environment of this process when it was made."""
 
     def __init__(self) -> None:
         self.place = _place()
@@ -45,7 +45,7 @@ class Worker:
         self._requests, self._answers = self._process.stdin, self._process.stdout
 
     def perform(self, arguments: list[str]) -> Done:
-        """Run `ffrobot ARGUMENTS` in a worker; return exit code and messages, its own if it ends with the run."""
+        """Run `ffrobot ARGUMENTS` in the worker. If the worker ends with the run, the exit code is its own."""
         self._messages.seek(0)
         self._messages.truncate()
         answer = b""
@@ -75,7 +75,7 @@ _own = local()
 
 
 def own_worker() -> Worker:
-    """The worker of this thread; another one where that has ended, or the folder or the environment has changed."""
+    """The worker of this thread; a new one if that has ended, or this process's folder or environment has changed."""
     worker: Worker | None = getattr(_own, "worker", None)
     if worker is None or worker._process.poll() is not None or worker.place != _place():
         end_own_worker()
@@ -90,7 +90,7 @@ def stop_own_worker() -> None:
 
 
 def end_own_worker() -> None:
-    """End this thread's worker, which performs no run."""
+    """End this thread's idle worker."""
     if (worker := getattr(_own, "worker", None)) is not None:
         worker.close()
 

@@ -45,12 +45,12 @@ COLUMNS: Mapping[str, Sequence[str]] = {
 }
 """What is shown of the rows of a part."""
 
-# The least time of repetitions is what the machine can do: what tables and figures show, and say that they do.
+# Tables and figures show the least time of repetitions, which is what the machine can do.
 HEADINGS = {"seconds_min": "least seconds"}
 
 
 def as_text(rows: Sequence[Row], columns: Sequence[str]) -> tuple[list[str], list[list[str]]]:
-    """Headings and cells of `columns`, without those that are empty in all rows."""
+    """Headings, and cells by row, of `columns`, without columns that are empty in all rows."""
     shown = [column for column in columns if any(row.get(column) is not None for row in rows)]
     headings = [HEADINGS.get(column, column.removeprefix("error_").replace("_", " ")) for column in shown]
     values = ([row.get(column) for column in shown] for row in rows)
@@ -84,7 +84,7 @@ Swept = tuple[ReferenceRun, list[Point]]
 
 
 class Campaign:
-    """Measures, writes below `folder` and prints to `console`."""
+    """Measurements of `ffrobot bench`, written below `folder` and printed to `console`."""
 
     columns = COLUMNS
 
@@ -94,7 +94,7 @@ class Campaign:
         self.machine = _about_machine()
 
     def scene(self, path: Path, analysis_name: str | None, folder: Path, parts: Sequence[str]) -> Swept | None:
-        """Measure work and precision, and the parts of the error, of a scene; returns the sweep where there is one."""
+        """Measure the `parts` "work-precision" and "axes" of a scene; returns reference and points of the former."""
         scene = load_scene(path)
         analysis = find_analysis(scene, analysis_name)
         swept = self.work_precision(scene, analysis.name, folder) if "work-precision" in parts else None
@@ -110,7 +110,7 @@ class Campaign:
         return swept
 
     def work_precision(self, scene: Scene, name: str, folder: Path) -> Swept:
-        """The sweep of one analysis, with its records and figures."""
+        """Measure run time against error of one analysis, and write records and figures; returns as `scene`."""
         settings = self.settings
         tolerance = TIGHTER * min(settings.tolerances)
         reference = find_reference(scene, name, tolerance, settings.budget, self.display)
@@ -151,27 +151,26 @@ class Campaign:
         print_table(self.console, *as_text(rows, self.columns[part]))
 
     def drawn(self, paths: Sequence[Path]) -> None:
-        """Print the names of files written."""
+        """Print the `paths` of files written."""
         for path in paths:
             self.console.out(path)
 
 
 def inputs_of(scene: Scene, bodies: Mapping[str, str]) -> dict[str, object]:
-    """Hashes of a scene and its modal bodies, for records."""
+    """Hash of a scene, and those of its modal bodies, for records."""
     return {"name": scene.name, "scene": _content_hash(scene.text), "bodies": dict(bodies)}
 
 
 Rows = Sequence[Mapping[str, Any]]
 Curves = Mapping[str, tuple[Sequence[float], Sequence[float]]]
 
-# Over a curve's points at their best: a run's smallest time is what the machine can do.
 TIME = "seconds_min"
 
 MOST_TICKS = 6  # at the points themselves
 
 
 def draw_work_precision(groups: Mapping[str, Rows], title: str, folder: Path) -> list[Path]:
-    """Run time against error, a figure for each kind of quantity and a curve for each group of rows."""
+    """Draw run time against error: a figure for each kind of quantity, a curve for each group; returns paths."""
     written: list[Path] = []
     time, error = "least run time (s)", "error / peak"
     for kind in KINDS:
@@ -181,18 +180,18 @@ def draw_work_precision(groups: Mapping[str, Rows], title: str, folder: Path) ->
 
 
 def grouped(rows: Rows, column: str) -> dict[str, Rows]:
-    """Rows by the values of a column."""
+    """Group rows by their values in a column."""
     return {name: [row for row in rows if row[column] == name] for name in dict.fromkeys(row[column] for row in rows)}
 
 
 def points_of(rows: Rows, x: str, y: str) -> tuple[list[float], list[float]]:
-    """Values of x and y of the rows that have both."""
+    """Values in columns x and y of the rows that have both."""
     pairs = [(float(row[x]), float(row[y])) for row in rows if row.get(x) and row.get(y)]
     return [a for a, _ in pairs], [b for _, b in pairs]
 
 
 def draw(curves: Curves, title: str, x_label: str, y_label: str, folder: Path, name: str) -> list[Path]:
-    """Curves on logarithmic axes, PNG and PDF; nothing where all are empty."""
+    """Draw curves (x, y) on logarithmic axes, PNG and PDF, unless all are empty; returns paths."""
     shown = {label: points for label, points in curves.items() if points[0]}
     if not shown:
         return []

@@ -66,7 +66,7 @@ def errors(measured: Histories, reference: Histories) -> dict[str, float]:
 
 
 def error_columns(error: Mapping[str, float]) -> dict[str, float | None]:
-    """Columns of a table with errors by kind."""
+    """Entries "error_KIND" of a row of a table; None for kinds without error."""
     return {f"error_{kind}": error.get(kind) for kind in KINDS}
 
 
@@ -85,10 +85,10 @@ class TimedRun:
     integrator: str  # the one that ran; for "auto" the one chosen
     status: str  # "completed", "over budget", "refused", or how the integration failed
     seconds: float = 0.0  # integration and outputs, of the analysis and of those whose actuation it takes
-    counts: Mapping[str, int] = field(default_factory=dict)  # `COUNTS` of the same
+    counts: Mapping[str, int] = field(default_factory=dict)  # `COUNTS` of these analyses
     histories: Histories = field(default_factory=dict, repr=False)
     bodies: Mapping[str, str] = field(default_factory=dict, repr=False)  # SHA-256 of modal body files by flexible body
-    why: str | None = None  # it was refused
+    why: str | None = None  # reason for "refused"
 
     @property
     def completed(self) -> bool:
@@ -110,7 +110,7 @@ class _Deadline(Watcher):
 
 
 def find_analysis(scene: Scene, name: str | None) -> IntegratedAnalysis:
-    """The analysis of that name, or the first that integrates. Raises `InputError` where there is none."""
+    """The analysis `name`, by default the first that integrates over time. Raises `InputError` without one."""
     integrated = [a for a in scene.analysis if isinstance(a, IntegratedAnalysis) and a.is_resumable]
     wanted = "expected one that integrates over time, pcid or forward"
     if not integrated:
@@ -125,7 +125,7 @@ def find_analysis(scene: Scene, name: str | None) -> IntegratedAnalysis:
 
 
 def with_analysis(scene: Scene, name: str, **changes: object) -> Scene:
-    """The scene with one analysis only, and the one whose actuation it takes; `changes` of keys concern both."""
+    """The scene with the analysis `name` alone and those whose actuation it takes, with `changes` of their keys."""
     kept: list[Analysis] = []
     for analysis in reversed(scene.analysis):
         if analysis.name == name or any(later.takes_actuation and later.source == analysis.name for later in kept):
@@ -135,7 +135,7 @@ def with_analysis(scene: Scene, name: str, **changes: object) -> Scene:
 
 
 def run(scene: Scene, name: str, budget: float, display: Watcher, *, keep: bool = True) -> TimedRun:
-    """Solve `scene`, which has the analysis `name` last, within `budget` (s). Histories only where `keep`.
+    """Solve `scene`, whose last analysis is `name`, within `budget` (s). `keep`: return histories, too.
 
     Raises `InputError` for anything wrong with the scene, `SolveError` where no state is found, `KeyboardInterrupt`
     after Ctrl-C.
@@ -178,7 +178,7 @@ Row = dict[str, object]
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings: repetitions, time limit of a run (s), names of integrators, tolerances."""
+    """Repetitions of a run, its time limit `budget` (s), names of integrators, tolerances."""
 
     repeat: int
     budget: float
@@ -197,13 +197,13 @@ class Settings:
 
 @dataclass(frozen=True)
 class ReferenceRun:
-    """The run against which errors are measured."""
+    """The run against which errors are measured, and an `other` one, whose difference from it is its `error`."""
 
     integrator: str
     tolerance: float
     other: str
     other_tolerance: float
-    # by kind, the difference from the run with `other`: an estimate of the larger error of the two
+    # by kind, relative to peaks: an estimate of the larger error of the two
     error: Mapping[str, float]
     histories: Histories = field(repr=False)
     bodies: Mapping[str, str] = field(repr=False)
@@ -214,7 +214,7 @@ class ReferenceRun:
 
     @property
     def in_words(self) -> str:
-        """The reference and its error as text, for the title of a table."""
+        """Reference and error as text, for the title of a table."""
         error = ", ".join(f"{kind} {value:.0e}" for kind, value in self.error.items())
         other = f"which {self.other} at {self.other_tolerance:.0e} agrees with to"
         return f"against {self.integrator} at {self.tolerance:.0e}, {other}: {error}"
@@ -222,7 +222,7 @@ class ReferenceRun:
 
 @dataclass
 class Point:
-    """A point of the diagram: an integrator at a tolerance, run several times; errors by kind, relative to peaks."""
+    """A point of the diagram: integrator at a tolerance, `seconds` of each run, `error` by kind, relative to peaks."""
 
     integrator: str
     tolerance: float
@@ -248,7 +248,7 @@ class Point:
 def find_reference(scene: Scene, name: str, tolerance: float, budget: float, display: Watcher) -> ReferenceRun:
     """Solve at `tolerance` with one integrator, and near it with another.
 
-    Raises `SolveError` where fewer than two of them complete.
+    Raises `SolveError` where fewer than two complete within a multiple of `budget` (s).
     """
     tolerance = max(TIGHTEST_TOLERANCE, tolerance)
     done: list[tuple[str, float, TimedRun]] = []
@@ -275,8 +275,8 @@ def measure_points(
 ) -> list[Point]:
     """Time every integrator at every tolerance, repetitions in turn, so that disturbances affect all equally.
 
-    What does not complete is kept with its status and tried once. An integrator that took a hundred times as long as
-    the best one before it is not asked for tighter tolerances.
+    Runs that do not complete are not repeated. An integrator that took a hundred times as long as the best of the
+    others is not run at tighter tolerances.
     """
     points: list[Point] = []
     for integrator in settings.integrators:
@@ -306,7 +306,7 @@ def _is_hopeless(points: Sequence[Point], integrator: str, tolerance: float) -> 
 
 
 def repeat_point(scene: Scene, name: str, point: Point, budget: float, display: Watcher) -> float:
-    """Run a point once more, however long it takes this time; returns its seconds."""
+    """Run a point once more, within ten times the `budget` (s); returns its run time, s."""
     timed = with_analysis(scene, name, integrator=point.integrator, tolerance=point.tolerance)
     again = run(timed, name, 10 * budget, display, keep=False)
     point.seconds.append(again.seconds)
@@ -378,8 +378,8 @@ def measure_axes(scene: Scene, analysis: IntegratedAnalysis, budget: float, disp
     """Rows of errors along each axis; runs that fail, or take longer than `budget` (s), stay as rows without errors.
 
     "mesh" compares with four times the elements, "modes" with twice the modes, on that mesh, "time" with a tenth of the
-    tolerance (time integration alone), "total" the scene as it is with all three: at most the sum of the others. What
-    the link files do not let change is left out: scenes of rigid or ready-made modal bodies have "time" alone.
+    tolerance (time integration alone), "total" the scene as it is with all three: at most the sum of the others. Axes
+    that the link files cannot vary are left out: scenes of rigid or ready-made modal bodies have "time" alone.
     """
     tight = max(TIGHTEST_TOLERANCE, UNSEEN * analysis.tolerance)
     rows: list[Row] = []

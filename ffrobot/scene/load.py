@@ -66,7 +66,7 @@ def load_scene(path: AnyPath, *, allow_python: Sequence[AnyPath] = ()) -> Scene:
 
 
 def load_robot(path: Path) -> Scene:
-    """The scene in a file as `load_scene` reads it; it may lack analyses, as an import writes it."""
+    """Read a scene file as `load_scene`, except that it may have no analyses, as imported robots have none."""
     data, rest = load_toml(path, "scene file"), [{"name": "rest", "kind": "static"}]
     scene = validated_scene({"analysis": rest} | data, path, read_text(path, "scene file"))
     return scene if "analysis" in data else scene.model_copy(update={"analysis": ()})
@@ -103,7 +103,7 @@ def make_scene(*, folder: PathLike[str] | str = ".", **keys: Any) -> Scene:
 def validated_scene(
     data: dict[str, Any], path: Path, text: str, functions: Mapping[str, object] | None = None
 ) -> Scene:
-    """The validated scene of `data`, which was read from `path` as `text`; `functions` of Python by their names.
+    """Validate the scene `data`, which was read from `path` as `text`; `functions` of Python by their names in it.
 
     Raises `InputError` as `load_scene` does.
     """
@@ -130,7 +130,7 @@ def _unavailable_keys(data: dict[str, object]) -> Iterator[str]:
 
 
 def with_times_of_actuation(data: dict[str, Any]) -> dict[str, Any]:
-    """`data` with `end` and `output_step` of their actuation in forward analyses without these."""
+    """Return `data` with `end` and `output_step` of analyses that lack them taken from their `actuation`."""
     try:
         sources = {analysis["name"]: analysis for analysis in data["analysis"]}
         analyses = []
@@ -146,7 +146,7 @@ def with_times_of_actuation(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def problems(scene: SceneKeys) -> Iterator[str]:
-    """Lines on everything in the scene that refers to something that does not exist or does not fit."""
+    """Yield a line on everything in the scene that refers to something that does not exist or does not fit."""
     yield from _all_duplicates(scene)
     yield from _reference_problems(scene)
     yield from _guess_problems(scene)

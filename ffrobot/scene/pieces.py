@@ -26,19 +26,19 @@ if TYPE_CHECKING:
 
 @struct
 class BodyInPieces:
-    """Division of a body into pieces, and their names as bodies, from root to tip."""
+    """Division `cut` of a body's link into pieces, and their `names` as bodies, from root to tip."""
 
     cut: CutLink
     names: tuple[str, ...]
 
     def point(self, label: str) -> str:
-        """Return the piece and name, PIECE.POINT, of one of the body's points."""
+        """Return the point PIECE.POINT where the body's point `label` is."""
         piece, name = self.cut.places[label]
         return f"{self.names[piece]}.{name}"
 
 
 def bodies_in_pieces(scene: Scene, counts: Mapping[str, int]) -> dict[str, BodyInPieces]:
-    """Divide bodies of a scene into `counts` pieces, by name; those in one piece are left out.
+    """Divide bodies of a scene into pieces, their `counts` by body; bodies in one piece are left out.
 
     Raises `InputError` where a link or the scene allows no pieces.
     """
@@ -62,7 +62,7 @@ def bodies_in_pieces(scene: Scene, counts: Mapping[str, int]) -> dict[str, BodyI
 
 
 def scene_of_pieces(scene: Scene, divided: Mapping[str, BodyInPieces]) -> Scene:
-    """The scene in which each piece is a body; points that scene and analyses name are those of the pieces."""
+    """The scene in which each piece is a body, welded to the next; names of points are those on the pieces."""
     places = places_on_pieces(divided)
     keys = {
         name: _renamed(getattr(scene, name), places)

@@ -12,10 +12,7 @@ from .kinds import AnyKind
 
 
 class SceneKeys(MechanismKeys):
-    """Keys of a scene file. Names of lists of tables are singular, as in the file.
-
-    `geometric_stiffening` "auto" includes it if the loads of a run change the stiffness of a link by more than 1 %.
-    """
+    """Keys of a scene file. Names of lists of tables are singular, as in the file."""
 
     pzt: tuple[Table[PztLayout], ...] = ()
     """Layouts of piezoelectric patches; names distinguish several on one body."""

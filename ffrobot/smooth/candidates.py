@@ -36,16 +36,17 @@ T = TypeVar("T")
 
 @struct
 class Candidate:
-    """A stream of set points (T, n), rad or m, every so many s, and the robot under it.
+    """A stream of T set points for n joints, and the simulated motion of the robot.
 
     Attributes:
         name: how it was made.
-        times, command: (T,) s, (T, n).
-        moments: (T, n) torques of motors for feed-forward, of inverted motions; None of others.
-        ride: the robot under it.
-        off_path: rad or m, of the joints together from the path of the record.
-        excess, torque: largest of speed, acceleration and jerk by their limits, and of torques; 0 without limits.
-            Beyond a limit of positions `excess` is above 1.
+        times, command: (T,) s, and (T, n) set points, rad or m.
+        moments: (T, n) feed-forward torques of motors, N·m or N, of inverted motions; None of others.
+        ride: the simulated motion.
+        off_path: largest distance from the recorded path, of all joints together, rad or m.
+        excess: largest ratio of speed, acceleration or jerk to its limit; 0 without limits, above 1 also beyond a
+            limit of positions.
+        torque: largest ratio of a motor's torque to its limit; 0 without limits.
     """
 
     name: str
@@ -70,9 +71,9 @@ class Candidate:
 
 
 def candidates(robot: Robot, before: Diagnosis, limits: Limits, step: float, kind: str = "") -> list[Candidate]:
-    """One of each kind, set points every `step` s, simulated; that of `kind` first, then the best.
+    """Simulate a motion of each kind, set points every `step` s; the requested `kind` comes first, then the best.
 
-    That is the one which settles first of those that keep the limits; where none settles, that which vibrates least.
+    Motions within the limits come before others, those that settle first before later ones, then the least vibration.
     """
     search = _Search(robot, before, limits, step)
 
@@ -202,7 +203,7 @@ def _worst(modes: Sequence[Modes], path: Piecewise) -> float:
 
 
 def distances(points: Array, line: Array) -> Array:
-    """Return distances (T,), in their unit, of points (T, n) from lines through vertices (m, n)."""
+    """Return distances (T,), in their unit, of points (T, n) from the polyline through the vertices `line` (m, n)."""
     nearest, last = scipy.spatial.cKDTree(line).query(points)[1], len(line) - 1
     off = []
     for first in (np.maximum(nearest - 1, 0), np.minimum(nearest, last - 1)):

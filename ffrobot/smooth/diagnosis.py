@@ -20,20 +20,20 @@ CAUSES = ("jitter", "jump", "noise", "gap", "coarse", "resonance")
 
 @struct
 class Diagnosis:
-    """Diagnosis of a stream of set points on a robot.
+    """Diagnosis of a stream of set points for n joints of a robot.
 
     Attributes:
-        recording, ride: the stream, and the robot under it.
-        even: the robot under its set points at even times; the same where these are no smoother.
+        recording, ride: the stream, and the simulated motion under it.
+        even: simulated motion under the same set points at even times; `ride` where these are no smoother.
         faults: of the stream.
-        modes: of postures along the motion, the last one at rest, with motors locked.
-        frequencies: (instants, k) Hz, the lowest of these modes.
-        alone: (n,) m, residual vibration at the point by each joint alone, peak to peak, linear model at the end: the
-            sum of its modes, which is the most that it can be.
-        shares: (n,) of the vibration by each joint in phase with the whole; they add up to 1.
-        by_mode: (k,) m, by frequency, of all joints.
-        spectrum: (1 + n, F) Hz, and of motors' accelerations, |∫ θ̈ e^(−iωt) dt|, rad/s.
-        peaks: (3, n) speed, acceleration and jerk.
+        modes: small vibrations in postures along the motion, the last one at rest, with motors locked.
+        frequencies: (postures, k) Hz, the lowest of these modes.
+        alone: (n,) m peak to peak, the most that each joint alone leaves as residual vibration at the point: the sum
+            over all modes of the linear model at the end.
+        shares: (n,) of each joint in the vibration, in phase with the whole; they add up to 1.
+        by_mode: (k,) m peak to peak, residual vibration by all joints at each frequency.
+        spectrum: (1 + n, F) frequencies, Hz, and |∫ θ̈ e^(−iωt) dt| of motors' accelerations θ̈, rad/s or m/s.
+        peaks: (3, n) largest speed, acceleration and jerk, in rad or m, and s.
     """
 
     recording: Recording
@@ -55,7 +55,7 @@ class Diagnosis:
         return 0.0 if settling is None or not self.frequencies.size else settling.residual
 
     def verdict(self, robot: Robot) -> str:
-        """Return the fault and its cause as text."""
+        """Return a sentence on the vibration and its cause."""
         kinds = list(dict.fromkeys(fault.kind for fault in self.faults))
         causes = [kind for kind in kinds if kind.startswith(CAUSES)]
         if not self.frequencies.size:
@@ -81,7 +81,7 @@ class Diagnosis:
 
 
 def diagnose(robot: Robot, recording: Recording, limits: Limits) -> Diagnosis:
-    """Simulate the stream as it is, and look for faults of it. Raises `SolveError` as `Robot.ride`."""
+    """Simulate the robot under the stream as it is, and find its faults. Raises `SolveError` as `Robot.ride`."""
     times, command = recording.dense(min(recording.step / 4, 1e-3))
     ride = robot.ride(times, command)
     path, modes, even = robot.servo.motors(times, command), modes_along(robot, ride), evened(recording)
@@ -119,7 +119,7 @@ def diagnose(robot: Robot, recording: Recording, limits: Limits) -> Diagnosis:
 
 
 def modes_along(robot: Robot, ride: Ride, *, of_links: bool = False) -> list[Modes]:
-    """Return modes at postures along the motion, the last one at rest."""
+    """Return modes at the postures of `ride`, the last one at rest; `of_links` as in `Robot.modes`."""
     return [robot.modes(q, of_links=of_links) for q in ride.postures]
 
 

@@ -26,7 +26,7 @@ COLUMNS = ("joint", "from", "to", "speed", "acceleration", "jerk", "at most, by 
 
 
 def print_smooth(smoothed: Smoothed, console: Console) -> None:
-    """Lines on the motion as it is, faults, a table of joints, the verdict."""
+    """Print the motion as it is, faults, a table of joints, the verdict, a table of new motions."""
     for name, text in _lines(smoothed):
         console.out(f"{name:<10} {text}")
     joints, *motions = _tables(smoothed)
@@ -38,7 +38,7 @@ def print_smooth(smoothed: Smoothed, console: Console) -> None:
 
 
 def write_page(smoothed: Smoothed, motion: Path | None, path: Path) -> None:
-    """One HTML file: the verdict, faults, tables, the picture."""
+    """Write an HTML file: the verdict, faults, tables, the picture."""
     used = [smoothed.robot.file, *([motion] if motion else [])]
     part = {
         "title": f"{smoothed.robot.file.name}: {motion.name if motion else 'trajectories of the scene'}",
@@ -104,7 +104,7 @@ LEAST = 1e-3  # of the tolerance: what is drawn of distances
 
 
 def picture(smoothed: Smoothed, extension: str) -> bytes:
-    """The file of the picture, "png" or "svg"."""
+    """Return the picture as a file's bytes; `extension` is "png" or "svg"."""
     before, units = smoothed.before, smoothed.robot.units
     with style():
         figure = Figure(figsize=WIDE, layout="constrained")

@@ -37,10 +37,9 @@ KEPT = 1e-6  # of a limit, beyond it, or rad or m beyond one of positions: round
 
 @struct
 class Recording:
-    """Set points (T, n), rad or m, of n joints at `times` (T,), s, from 0 and increasing.
+    """Set points `values` (T, n), rad or m, of n `joints` at `times` (T,), s, from 0 and increasing.
 
-    `stamps` (S,) are the times of all rows as they were written; `rates` (T, n), rad/s or m/s, where they were
-    written, too.
+    `stamps` (S,), s, are the times of all rows as they were written; `rates` (T, n), rad/s or m/s, None unless written.
     """
 
     joints: tuple[str, ...]
@@ -56,9 +55,9 @@ class Recording:
         return float(np.median(np.diff(self.times)))
 
     def dense(self, step: float) -> tuple[Array, Array]:
-        """Return times (T,), s, and set points (T, n), rad or m, at most `step` s apart, by cubics with recorded rates.
+        """Return times (N,), s, at most `step` s apart, and set points (N, n), rad or m, by cubics with recorded rates.
 
-        Without rates they are those recorded.
+        Without rates it returns the recorded ones.
         """
         if self.rates is None:
             return self.times, self.values
@@ -115,7 +114,7 @@ def without_rest(recording: Recording) -> Recording:
 
 
 def planned(scene: Scene, step: float, watcher: Watcher) -> Recording:
-    """The motion along the trajectories of the scene, with rigid gears, every `step` s.
+    """Solve for the motion along the trajectories of the scene, with rigid gears, every `step` s.
 
     Raises `InputError` where the scene has none, or no analysis through time says for how long.
     """
@@ -157,7 +156,7 @@ class Fault:
 
 
 def faults_of_stamps(recording: Recording) -> Iterator[Fault]:
-    """Yield doubled stamps, steps back, gaps and jitter."""
+    """Yield faults of the times of rows: doubled stamps, steps back, gaps and jitter."""
     steps, usual = np.diff(recording.stamps), recording.step
     if doubled := int(np.count_nonzero(steps == 0.0)):
         yield Fault("doubled stamps", f"{doubled} rows have the time of the row before: only the first counts")
@@ -186,7 +185,7 @@ def faults_of_stamps(recording: Recording) -> Iterator[Fault]:
 def evened(recording: Recording) -> Recording:
     """Return the recording with rows at even times, if these make a smoother motion than those of their stamps.
 
-    Even times divide the whole evenly: of the usual step, its median, jitter leaves some per cent, which add up.
+    Even times divide the whole duration: the median step is some per cent off with jitter, which would add up.
     """
     if recording.rates is not None:
         return recording
@@ -199,7 +198,7 @@ def evened(recording: Recording) -> Recording:
 def faults_of_motion(recording: Recording, limits: Limits, torque: Array) -> Iterator[Fault]:
     """Yield jumps, noise, and exceeded limits; of rows at even times where these are the smoother ones.
 
-    `torque` (n,), N·m or N, is what the motion takes of motors.
+    `torque` (n,), N·m or N, is the largest of each motor in the motion.
     """
     motion = evened(recording)
     times, values = motion.dense(motion.step / 4)
@@ -217,9 +216,9 @@ def faults_of_motion(recording: Recording, limits: Limits, torque: Array) -> Ite
 
 @struct
 class Limits:
-    """Ranges of positions (n, 2), rad or m; `sizes` (4, n) of speed, acceleration, jerk (rad or m, s) and torque (N·m).
+    """Ranges of `positions` (n, 2), rad or m; `sizes` (4, n): speed, acceleration, jerk (rad or m, s), torque (N·m, N).
 
-    They are infinite without a limit. `units` (n,) are those of coordinates.
+    They are infinite without a limit. `units` (n,): "rad" or "m", of the n joints.
     """
 
     positions: Array

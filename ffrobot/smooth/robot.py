@@ -38,7 +38,7 @@ INSTANTS = 9  # postures along the motion whose frequencies are found
 
 
 def accelerations(path: Piecewise) -> tuple[Array, Array]:
-    """Return times (T,), s, to the end of motors' paths, and their accelerations (T, n), rad/s² or m/s²."""
+    """Return times (T,), s, to the end of the `path` of n motors, and their accelerations (T, n), rad/s² or m/s²."""
     fine = np.linspace(0.0, path.end, FINE)
     return fine, path.sample(fine, 2)
 
@@ -49,7 +49,7 @@ class Modes:
 
     Attributes:
         omega, ratio: (m,) rad/s, and damping ratios.
-        driven: (m, n) at the point, what a unit of acceleration of each motor drives.
+        driven: (m, n) modal acceleration, by its size at the point, per unit of each motor's, m/s² by rad/s² or m/s².
     """
 
     omega: Array
@@ -57,9 +57,9 @@ class Modes:
     driven: Array
 
     def left(self, times: Array, accelerations: Array) -> ComplexArray:
-        """Return amplitudes (m, n), m, at the point at the last of `times` (T,), s.
+        """Complex amplitudes (m, n), m, at the point at the last of `times` (T,), s, of each mode by each motor.
 
-        They are by accelerations (T, n), rad/s² or m/s², of each motor.
+        `accelerations` (T, n), rad/s² or m/s², are those of the motors.
         """
         poles = self.omega * (-self.ratio + 1j * np.sqrt(1.0 - self.ratio**2))
         widths = (np.append(0.0, np.diff(times)) + np.append(np.diff(times), 0.0)) / 2
@@ -69,13 +69,13 @@ class Modes:
 
 @struct
 class Ride:
-    """The robot under one stream of set points.
+    """Simulated motion of the robot under one stream of set points.
 
     Attributes:
         settling: of the point, by its distance from its final place since the last set point; its residual is that of
             the first period of the lowest vibration once the controllers have settled. None without a place of rest.
-        times, off: (T,) s, and m between the point and its final place.
-        postures: (`INSTANTS`, n_q) evenly along the motion to the last set point; the last one is that of rest.
+        times, off: (T,) s, and distance of the point from its final place, m.
+        postures: (`INSTANTS`, n_q) coordinates, rad and m, evenly along the motion; the last one is that of rest.
         torque: (n,) largest of each motor, N·m or N.
         sag: (2, n) by which joints are off their set points at rest, at the start and at the end, rad or m.
     """
@@ -89,7 +89,10 @@ class Ride:
 
 
 class Robot:
-    """A scene's robot; all of its joints with motors follow set points by `servo`, in the order of the scene."""
+    """A scene's robot, whose joints with motors, in the scene's order, follow set points by the controllers `servo`.
+
+    `point` "BODY.POINT" is where vibration counts (None: the tool), `tolerance`, m, that of its final place.
+    """
 
     def __init__(self, scene: Scene, servo: Servo, point: str | None, tolerance: float, watcher: Watcher) -> None:
         self.file, self.servo, self.tolerance, self._watcher = scene.path, servo, tolerance, watcher
@@ -106,7 +109,7 @@ class Robot:
         self._frequency: float | None = None
 
     def units(self, per: str = "") -> str:
-        """Return units of the joints' coordinates, or of what they are `per` some time."""
+        """Return units of the joints' coordinates, or of rates with `per`, such as "/s"."""
         return ", ".join(f"{unit}{per}" for unit in self._units)
 
     def modes(self, q: Array, *, of_links: bool = False) -> Modes:
@@ -153,7 +156,7 @@ class Robot:
         return Ride(replace(whole, residual=soon.residual), run.time, off, postures, torque, sag)
 
     def inverted(self, times: Array, motion: Piecewise) -> tuple[Array, Array]:
-        """Return set points (T', n) every `times[1]` s by which links follow `motion`, and motors' torques (N·m, N).
+        """Set points (N, n), rad or m, every `times[1]` s for links to follow `motion`, and motors' torques (N·m, N).
 
         Gears are strained by what the motion needs: motors are ahead by K⁻¹τ, and the controllers are inverted, which
         begin before the motion and end after it by `Servo.margins`.

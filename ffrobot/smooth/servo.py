@@ -29,9 +29,9 @@ COLUMNS = ["frequency", "magnitude", "phase"]
 
 @struct
 class Axis:
-    """G(s) = e^(−delay·s) numerator/denominator, coefficients of the highest power first and the last of both 1.
+    """Controller of one joint, motor angle by set point: G(s) = e^(−delay·s) numerator/denominator, `delay` in s.
 
-    `words` say what it is.
+    Coefficients begin with the highest power; the last of both is 1. `words` describe it in messages.
     """
 
     numerator: Array
@@ -51,7 +51,7 @@ class Axis:
         return np.concatenate([real, upper, upper.conj()])
 
     def at(self, s: ComplexArray) -> ComplexArray:
-        """Return G, a ratio of angles or ways, at s (1/s)."""
+        """Return G, a ratio of angles or of displacements, at s (1/s) of any shape."""
         return np.asarray(np.exp(-self.delay * s) * np.polyval(self.numerator, s) / np.polyval(self.denominator, s))
 
 
@@ -112,9 +112,10 @@ def _measured(path: Path) -> Axis:
 
 
 def fitted(frequency: Array, response: ComplexArray) -> Axis:
-    """Fit the axis with the fewest poles that is near a response (F,) at frequencies (F,), Hz; else the nearest of all.
+    """Fit the axis of fewest poles that is near a complex `response` (F,), a ratio, at frequencies (F,), Hz.
 
-    Least squares of G with pairs of poles ω²/(s² + 2ζω s + ω²), two zeros less, and a delay.
+    Least squares of G with pairs of poles ω²/(s² + 2ζω s + ω²), two zeros less, and a delay; the nearest if none is
+    near.
     """
     s = 2j * np.pi * frequency
     unit = float(abs(s[int((np.abs(response) < np.sqrt(0.5)).argmax()) or -1]))  # rad/s, where it falls by 3 dB
@@ -162,7 +163,7 @@ class Servo:
         return max(axis.delay + _decay(axis.poles) for axis in self.axes)
 
     def motors(self, times: Array, command: Array) -> Piecewise:
-        """Return paths of n motors from rest, under set points (T, n) at `times` (T,), rad or m, s, on to `settled`.
+        """Return paths of n motors from rest, under set points (T, n), rad or m, at `times` (T,), s, and `settled` on.
 
         Each line of the command is exact: a change of its slope by Δ adds Δ (t − Σρ + Σρ e^(λt)), with the residues ρ
         of G/s² at the poles λ of G.
@@ -193,21 +194,21 @@ class Servo:
 
     @property
     def margins(self) -> tuple[float, float]:
-        """By how long (s) set points of `command` begin before motors, and end after them: zeros of G decay."""
+        """Times (s) by which set points of `command` begin before motors, and end after them: zeros of G decay."""
         zeros = np.concatenate([np.roots(axis.numerator) for axis in self.axes]).astype(complex)
         before, after = _decay(zeros[zeros.real > 0.0]), _decay(zeros[zeros.real <= 0.0])
         return before, after + float(np.ptp([axis.delay for axis in self.axes]))
 
     @property
     def is_invertible(self) -> bool:
-        """Whether `margins` are short: not of zeros near the imaginary axis, which decay slowly or never."""
+        """Whether `margins` are short; near the imaginary axis zeros of G decay slowly or never."""
         return max(self.margins) <= LASTING
 
     def command(self, step: float, position: Array, rate: Array) -> Array:
-        """Return set points (T, n) every `step` s for motors from rest to rest: positions, rates (T, n), rad or m, s.
+        """Set points (T, n) every `step` s for `position` and `rate` (T, n), rad or m, s, of motors from rest to rest.
 
         By Fourier transforms: θ_cmd = θ_r + F θ̇_r, F = (e^(−Δs)/(G sinc²) − 1)/s. The longest delay Δ keeps axes
-        together; sinc² is what lines between set points leave of a frequency.
+        together; sinc² is the response of straight lines between set points.
         """
         frequency, count = np.fft.rfftfreq(len(rate), step), len(rate)
         s, longest = 2j * np.pi * frequency[1:], max(axis.delay for axis in self.axes)
@@ -225,7 +226,7 @@ def _decay(poles: ComplexArray) -> float:
 
 
 def quintics(nodes: Array, states: Array) -> Piecewise:
-    """Return a path through positions, rates and accelerations (K, 3, n), rad or m and s, at `nodes` (K,), s."""
+    """Path of quintics through positions, rates, accelerations `states` (K, 3, n), rad or m, s, at `nodes` (K,), s."""
     h = np.diff(nodes)[:, None]
     (p, v, a), (q, w, b) = states[:-1].transpose(1, 0, 2), states[1:].transpose(1, 0, 2)
     d, v, w, a, b = q - p, v * h, w * h, a * h**2, b * h**2

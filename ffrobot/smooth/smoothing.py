@@ -32,9 +32,9 @@ class Smoothed:
     """Result of `smooth_motion`.
 
     Attributes:
-        robot: what was simulated.
-        before: the motion as it is.
-        limits: of joints.
+        robot: the simulated robot.
+        before: diagnosis of the motion as it is.
+        limits: of the joints.
         candidates: motions along the same path, simulated, that of `kind` first, then the best; none where the motion
             is good as it is, or nothing can vibrate.
         kind: requested kind of motion: averaged, slower, shaped, inverted; any if empty.
@@ -63,7 +63,7 @@ class Smoothed:
 
     @property
     def own(self) -> Candidate:
-        """The motion as it is."""
+        """The motion as it is, as one of the `candidates`."""
         of, ride = self.before.recording, self.before.ride
         shares = (np.vstack([self.before.peaks, ride.torque]) / self.limits.sizes).max(axis=1)
         return Candidate(

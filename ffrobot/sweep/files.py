@@ -29,7 +29,7 @@ class Variation:
         keys: parts of each key, `("links", "link1", "geometry", "section", "height")`.
         values: the values, in order.
         ends: first and last value of a range, from which a sample draws; None where values are listed.
-        logarithmic: whether a range is even in the logarithm.
+        logarithmic: whether values of a range are evenly spaced in the logarithm.
     """
 
     keys: tuple[tuple[str, ...], ...]
@@ -43,7 +43,7 @@ class Variation:
         return ",".join(".".join(key) for key in self.keys)
 
     def draw(self, u: float) -> Value:
-        """The value at u in [0, 1) of the range, or of the list."""
+        """The value at the share u, in [0, 1), of the range or the list."""
         if self.ends is None:
             return self.values[int(u * len(self.values))]
         a, b = self.ends
@@ -100,11 +100,11 @@ LINKS, SCENE = "links", "scene.toml"
 
 @dataclass(frozen=True)
 class RunFiles:
-    """The scene of one run and the link files that its changes concern, not written yet.
+    """Content of the scene file of one run and of its changed link files.
 
     Attributes:
-        scene: its tables; of changed links the names in the run's folder.
-        links: the tables of changed links, by name there.
+        scene: tables of the scene, with the names of changed link files in the run's folder.
+        links: tables of changed link files, by their path there.
         inputs: fingerprints of everything that the run is made from, under the names of the user's files.
     """
 
@@ -121,9 +121,9 @@ class RunFiles:
 
 
 def run_files(scene_path: Path, changes: Mapping[tuple[str, ...], Value], folder: Path) -> RunFiles:
-    """The scene at `scene_path` with `changes`, and the link files they concern, for the folder `folder`.
+    """Return the scene at `scene_path` with `changes` by key, and link files that these change, for `folder`.
 
-    Raises `InputError` for a key that leads nowhere.
+    Raises `InputError` for a key in a table or list entry that does not exist.
     """
     scene, links = _read(scene_path, "scene file"), dict[str, Table]()
     for key, value in changes.items():
@@ -143,7 +143,7 @@ def run_files(scene_path: Path, changes: Mapping[tuple[str, ...], Value], folder
 def value_at(scene_path: Path, key: tuple[str, ...], option: str) -> Value:
     """Return the value of `key` in the scene, or in a link file for `links.BODY.…`; None if absent.
 
-    Raises `InputError`, with the `option` of the command that names the key, where that leads nowhere.
+    Raises `InputError`, with the `option` of the command that names the key, for a missing body or list entry.
     """
     return value_of(*_place(scene_path, _read(scene_path, "scene file"), key, {}, option), key, option)
 
@@ -231,7 +231,7 @@ def _resolve(data: Node, folder: Path) -> None:
 
 
 def value_of(data: Node, key: tuple[str, ...], whole: tuple[str, ...] = (), option: str = "--vary") -> Value:
-    """Return data[key], entries of a list as in `set_key`; None if absent. `option`: of the command, in messages."""
+    """Return data[key], see `set_key`; None if absent. `option`: of the command, in messages; `whole`: as there."""
     value: Value = data
     for part in key:
         if not isinstance(value, dict | list) or (isinstance(value, dict) and part not in value):

@@ -49,9 +49,10 @@ OF_MODES = {"linear", "joints_locked", "joints_compliant"}
 
 @dataclass(frozen=True)
 class SweepRun:
-    """One combination of values: the paths of its files, the quantities to collect, and its input.
+    """Run of one combination of `values`: its number in the table and its `folder`.
 
-    `wanted`: see `Sweep`.
+    `collect`: `--collect` requests; `inputs`: fingerprints of files it is made from; `allow_python`: folders with
+    allowed Python files; `wanted`: the only datasets needed (empty: all).
     """
 
     number: int
@@ -67,8 +68,8 @@ class SweepRun:
 class Row:
     """Row of a run: `status` "completed", "wrong input", "failed" or "crashed", with the program's message.
 
-    `inputs` are the fingerprints of what it was made from: see `run.inputs`; among them those of the files `imported`
-    by the scene's Python files, which nobody knows before the run. `wanted`: what alone its results have; empty: all.
+    `inputs` are fingerprints of the files it was made from: see `run.inputs`; among them of those `imported` by the
+    scene's Python files, known after the run only. `wanted`: the only datasets in its results (empty: all).
     """
 
     number: int
@@ -81,11 +82,11 @@ class Row:
     wanted: tuple[str, ...] = ()
 
     def has(self, wanted: tuple[str, ...]) -> bool:
-        """Whether the results have all datasets that are `wanted`; see `Sweep`."""
+        """Whether the run's results have all `wanted` datasets (empty: all of a solve)."""
         return not self.wanted or (bool(wanted) and set(wanted) <= set(self.wanted))
 
     def changes(self, inputs: Mapping[str, str]) -> list[str]:
-        """Return names of inputs that have changed since the run; see `run.inputs.changed`."""
+        """Return names of files in `inputs`, or imported, that have changed since the run; see `run.inputs.changed`."""
         return changed(self.inputs, {**inputs, **{name: digest_of_file(Path(name)) for name in self.imported}})
 
 
@@ -160,7 +161,7 @@ def _quantities(path: Path, run: SweepRun) -> dict[str, float]:
 
 
 def by_dots(results: Results, datasets: Sequence[str]) -> dict[str, str]:
-    """Datasets by the names they go by, with dots; those of the first analysis without its name, too."""
+    """Datasets by their names with dots for slashes; those of the first analysis also without its name."""
     first = f"{results.analyses[0]}/" if results.analyses else "/"
     short = {name.removeprefix(first).replace("/", "."): name for name in datasets if name.startswith(first)}
     return short | {name.replace("/", "."): name for name in datasets}
@@ -221,7 +222,7 @@ def is_vector(results: Results, name: str, values: Array) -> bool:
 
 
 def collected(request: str) -> tuple[str, str]:
-    """Dataset and reduction of a `--collect`, or the word of `SETTLING` and the point.
+    """Split a `--collect` request into dataset and reduction, or the word of `SETTLING` and the point.
 
     Raises `InputError` where the word behind the colon is unknown.
     """

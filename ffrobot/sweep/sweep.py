@@ -39,10 +39,9 @@ class Sweep:
     """The runs of a scene: `points` are the combinations of the `variations`' values, one run each.
 
     `collect` names histories whose reductions become columns beside the standard ones; see `runs.REDUCTIONS`. `fixed`
-    are changes that all points share, `own` the values that the scene has itself, which change nothing. `growing`: of
-    the points of a search, which has `earlier` rows and may have later ones; folders of runs are then named by what
-    their scenes have changed, and their results stay, to be read. `wanted`: datasets and groups of the results, with
-    their analysis, where no others are needed.
+    are changes that all points share, `own` the values that the scene has itself, which change nothing. `growing`: the
+    points are of a search with `earlier` rows and maybe later ones; then changes name the folders of runs, and results
+    stay, to be read. `wanted`: datasets and groups of the results, with their analysis, where no others are needed.
     """
 
     scene: Path
@@ -69,7 +68,7 @@ class Sweep:
 
     @property
     def runs(self) -> list[SweepRun]:
-        """Runs in the order of the table."""
+        """The runs of `points`, in the order of the table."""
         runs = []
         for k, values in enumerate(self.points, start=len(self.earlier)):
             name = f"{k:04d}"
@@ -81,7 +80,7 @@ class Sweep:
         return runs
 
     def changes(self, values: Sequence[Value]) -> dict[Key, Value]:
-        """Return changed values of one run's scene, by key."""
+        """Return, by key, how the scene of the point `values` differs from the user's."""
         points = zip(self.variations, values, self.own or (None,) * len(values), strict=True)
         return {**self.fixed, **{key: value for v, value, own in points if value != own for key in v.keys}}
 
@@ -97,10 +96,8 @@ def plan_sweep(
 ) -> Sweep:
     """Plan a run for every combination of the values, the last key fastest, or `sample` points of a Latin hypercube.
 
-    Its values spread evenly over each range (McKay, Beckman & Conover 1979).
-
-    Raises `InputError` for a wrong `--vary` or `--collect`, a scene or link file that its first point makes wrong, and
-    a folder that holds another sweep.
+    The hypercube spreads values evenly over each range (McKay, Beckman & Conover 1979). Raises `InputError` for a wrong
+    `--vary` or `--collect`, a scene or link file that the first point makes wrong, and a folder of another sweep.
     """
     check_folder(folder)
     variations = tuple(parse_variation(text) for text in vary)
@@ -122,7 +119,10 @@ def plan_sweep(
 
 
 def run_sweep(sweep: Sweep, batch: Batch, watcher: Watcher) -> list[Row]:
-    """The rows of all runs, jobs of `batch`; failures are rows, too. The table in the folder grows with every run."""
+    """Do the runs of a sweep by `batch`, and return their rows, failures too; the table grows with every run.
+
+    Raises `InputError` where files change meanwhile, `StoppedError` after a signal.
+    """
     rows, waiting = _rows_and_runs(sweep)
 
     def tabulate() -> None:
@@ -161,7 +161,7 @@ def run_sweep(sweep: Sweep, batch: Batch, watcher: Watcher) -> list[Row]:
 
 
 def stale_rows(sweep: Sweep) -> str:
-    """Drop rows whose input has changed since; returns one line on the changes, empty if none."""
+    """Delete rows of runs whose input has changed since; returns a line on the changes, empty if none."""
     stale: dict[str, None] = {}
     count = 0
     for run in sweep.runs:
@@ -195,7 +195,7 @@ def _files(sweep: Sweep, run: SweepRun) -> RunFiles:
 def check_point(sweep: Sweep, values: tuple[Value, ...]) -> None:
     """Raise `InputError`, before any run, if the scene or a link file is invalid with these values.
 
-    What needs the whole scene, or its results, is not seen.
+    Values that depend on modal bodies are not checked.
     """
     from ..fe_models.link_file import read_link
     from ..scene.load import load_scene
@@ -217,7 +217,7 @@ def check_point(sweep: Sweep, values: tuple[Value, ...]) -> None:
 def claim_folder(sweep: Sweep) -> None:
     """Start or resume the folder of a sweep. Raises `InputError` for a folder of another sweep.
 
-    One that grows is the same with whatever keys and points.
+    A sweep that is `growing` may resume with other keys and points.
     """
     scene = str(sweep.scene.absolute())
     of_points = {"keys": sweep.keys, "points": sweep.points, "collect": sweep.collect}
@@ -249,7 +249,7 @@ GAP = 2  # between columns
 
 
 def print_table(sweep: Sweep, rows: Sequence[Row], console: Console) -> None:
-    """Print keys, status and the collected or a few default quantities; the file has them all."""
+    """Print keys, status and the collected, or a few default, quantities of each run; the table's file has all."""
     asked = [" ".join(collected(request)) for request in sweep.collect]
     quantities = [name for name in _quantities(rows) if not name.endswith((" steps", " wall_seconds"))]
     shown = [name for name in quantities if name in asked] if asked else quantities[:SHOWN]
