@@ -154,7 +154,7 @@ def place(
     indices, sets, method = _search(room, gap * np.arange(count), wanted.most_sets, lambda i: judge(Phi_V[:, i], C[i]))
     found = [
         (centers[indices], Phi_V[:, indices], C[indices]),
-        (even.edges.mean(axis=1), even.Phi_V, even.read_capacitance),
+        (even.edges.mean(axis=1), even.Phi_V, even.effects.capacitance.diagonal()),
     ]
     rated = [Evaluation(x, gain(P).sum(axis=1), float(judge(P[:, None], of[None])[0])) for x, P, of in found]
     voltages = [np.nan if F_p is None else float(_voltages(shape, P[:, None], F_p)[0]) for _, P, _ in found]
@@ -247,7 +247,7 @@ def _candidates(
             patch = link.patches(count=None, centers=(float(center),))
         except InputError:  # across a step of the section: such a patch does nothing
             continue
-        columns[:, k], capacitance[k] = patch.Phi_V[:, 0], patch.read_capacitance[0]
+        columns[:, k], capacitance[k] = patch.Phi_V[:, 0], patch.effects.capacitance[0, 0]
     return centers, gap, columns, capacitance
 
 

@@ -235,15 +235,15 @@ def volts_on_file(of_link: LinkPatches, layout: str, capacitance: float | None =
     A patch reads its charge over its `capacitance`, F. By reciprocity the charge of a deflection is the modal force of
     a voltage, Φ_Vᵀ p (Lee and Moon, J. Appl. Mech. 57, 1990). A patch that also drives the link is read through a
     bridge, which leaves this voltage (Dosch, Inman and Garcia, J. Intell. Mater. Syst. Struct. 3, 1992). With open
-    electrodes patches bend the link back, by strains that modes lack: `OnBody.yielding`.
+    electrodes patches bend the link back, by strains that modes lack.
     """
-    own, columns, bodies = of_link.arrays[layout].layout, of_link.columns(layout), of_link.bodies
+    columns, bodies = of_link.columns(layout), of_link.bodies
     pieces = [name for name in bodies if name != of_link.body]
 
     def volts(of: OnBody, parts: Iterable[str]) -> Array:
-        yielding = np.sum([bodies[part].yielding[columns] for part in parts], axis=0)
-        C = own.read_capacitance(yielding)
-        return (of.charge[:, columns] / (C if capacitance is None else capacitance)).T
+        if capacitance is not None:
+            return of.charge[:, columns].T / capacitance
+        return np.linalg.solve(np.sum([bodies[part].capacitance for part in parts], axis=0), of.charge.T)[columns]
 
     return {name: volts(of, pieces if name in pieces else [name]) for name, of in bodies.items()}
 

@@ -103,8 +103,8 @@ class LayersOnLink(NamedTuple):
     """Layers of k patches on their link with n modes: for each Gauss point a row for each strain that interacts.
 
     B (rows, n): strains of the modes, SI. Loads times weights of points are P = `by_volts` (rows, k) V − `by_modes`
-    (rows, n) p, N·m² and N·m; on a straight link `straight` (rows, k) V. `yielding` (k,): what residual strains, which
-    modes lack, add to capacitances, F.
+    (rows, n) p, N·m² and N·m; on a straight link `straight` (rows, k) V. `yielding` (k, k): what residual strains,
+    which modes lack, add to capacitances, F.
     """
 
     points: list[GaussPoint]
@@ -143,7 +143,7 @@ def layers_on_link(placed: Sequence[PlacedLayout], body: ModalBody) -> LayersOnL
     R = _residual(exact, B @ np.linalg.solve(body.stiffness, B.T))
     held = np.linalg.solve(np.eye(len(B)) + C @ R, np.concatenate([C @ B, f], axis=1))
     by_volts = held[:, B.shape[1] :]
-    return LayersOnLink(points, B, held[:, : B.shape[1]], by_volts, straight, (f * (R @ by_volts)).sum(axis=0))
+    return LayersOnLink(points, B, held[:, : B.shape[1]], by_volts, straight, f.T @ R @ by_volts)
 
 
 def stiffness_ratios(placed: PlacedLayout, body: ModalBody) -> tuple[Array, Array]:
@@ -256,7 +256,8 @@ class Effects(NamedTuple):
         lever: (k,) strain of the surface per curvature and distance: 1; of its diagonals per twist: β/2.
         turn: (k, n) rotation of the sections at the ends of a patch against each other, in its sense, rad/(m·√kg).
         Phi_V: (k, n) modal forces per volt, N/(√kg·V), reduced by the stiffness of the layers.
-        yielding: (k,) what strains that modes lack add to the capacitance, F.
+        capacitance: (k, K) charges, F, by voltages of the K patches of the link, as sensors; those with open electrodes
+            are clamped, but for the strains that modes lack.
     """
 
     extent: Array
@@ -264,20 +265,28 @@ class Effects(NamedTuple):
     lever: Array
     turn: Array
     Phi_V: Array
-    yielding: Array
+    capacitance: Array
 
 
 def effects(key: str, placed: Sequence[PlacedLayout], body: ModalBody) -> list[Effects]:
     """Return the effects of each layout of one link, coupled by their stiffness if it counts; `key` begins messages."""
     found = [_straight(key, one, body) for one in placed]
-    stiff = [k for k, one in enumerate(placed) if one.layout.adds_stiffness]
-    if not stiff:
-        return found
-    _, *of_patches = composite([placed[k] for k in stiff], body)
-    ends = np.cumsum([len(placed[k].edges) for k in stiff])[:-1]
-    for k, lacking, yielding in zip(stiff, *(np.split(of, ends) for of in of_patches), strict=True):
-        found[k] = found[k]._replace(Phi_V=found[k].Phi_V - lacking, yielding=yielding)
-    return found
+    layouts, share = _each(placed)
+    stiff, opened = np.array([(of.adds_stiffness, of.electrodes == "open") for of in layouts]).T
+    lacking = np.zeros((len(layouts), body.mode_count))
+    C = np.diag([of.capacitance(clamped=of.electrodes == "open") for of in layouts] * share)
+    if stiff.any():
+        _, lacking[stiff], yielding = composite([one for one in placed if one.layout.adds_stiffness], body)
+        C[np.ix_(opened, opened)] += yielding[np.ix_(opened[stiff], opened[stiff])]
+    ends = np.cumsum([len(one.edges) for one in placed])[:-1]
+    parts = zip(found, np.split(lacking, ends), np.split(C, ends), strict=True)
+    return [one._replace(Phi_V=one.Phi_V - part, capacitance=charges) for one, part, charges in parts]
+
+
+def _each(placed: Sequence[PlacedLayout]) -> tuple[list[PztLayout], Array]:
+    """Layout of each of k patches, and the share (k,) of the patch that lies on the body."""
+    layouts = [one.layout for one in placed for _ in one.edges]
+    return layouts, np.diff(np.concatenate([one.edges for one in placed]))[:, 0] / [of.length for of in layouts]
 
 
 def _straight(key: str, placed: PlacedLayout, body: ModalBody) -> Effects:
@@ -302,7 +311,7 @@ def _straight(key: str, placed: PlacedLayout, body: ModalBody) -> Effects:
             membrane /= 1.0 - (layout.poissons_ratio or 0.0)
         Phi_V = membrane[:, None] * _outlined(key, layout, body, edges)
     lever = lever / 2 if layout.bends == "twist" else np.ones(len(edges))
-    return Effects(extent, c, lever, turn, Phi_V, np.zeros(len(edges)))
+    return Effects(extent, c, lever, turn, Phi_V, np.zeros((0, 0)))
 
 
 def _stretches(
@@ -435,18 +444,18 @@ def _with_charges(patched: Body, body: ModalBody, placed: Sequence[PlacedLayout]
     of each mode that they lead to.
     """
     layers = layers_on_link(placed, body)
-    layouts = [one.layout for one in placed for _ in one.edges]
-    share = np.diff(np.concatenate([one.edges for one in placed]))[:, 0] / [of.length for of in layouts]
+    layouts, share = _each(placed)
     charged = np.flatnonzero([of.gives_way for of in layouts])
-    C = np.array([of.capacitance(clamped=True) for of in layouts]) * share + layers.yielding
-    Phi = (layers.by_volts.T @ layers.B @ patched.modal_transform)[charged] / np.sqrt(C[charged])[:, None]
-    R = np.array([layouts[k].shunt or np.inf for k in charged]) / share[charged]
+    C = np.diag([of.capacitance(clamped=True) for of in layouts] * share) + layers.yielding
+    turn = np.linalg.inv(np.linalg.cholesky(C[np.ix_(charged, charged)]))
+    conductance = share[charged] / [layouts[k].shunt or np.inf for k in charged]
+    rates, independent = np.linalg.eigh(turn * conductance @ turn.T)
+    Phi = independent.T @ turn @ (layers.by_volts.T @ layers.B @ patched.modal_transform)[charged]
     K, modes = np.diag(patched.stiffness), np.eye(patched.n_modes)
     values, added = patched.stiffness, np.zeros_like(K)
     for _ in range(PASSES):
         omega = np.sqrt(values.clip(min=SMALLEST))
-        with np.errstate(divide="ignore"):
-            lag = 1.0 / np.multiply.outer(R * C[charged], omega)  # 1/(ωRC)
+        lag = rates[:, None].clip(min=0.0) / omega  # 1/(ωRC)
         stiff = Phi @ modes / np.sqrt(1.0 + lag**2) @ modes.T
         damps = Phi @ modes * np.sqrt(lag / (omega * (1.0 + lag**2))) @ modes.T
         added = stiff.T @ stiff

@@ -47,7 +47,7 @@ class OnBody:
     turn: Array  # (n, k) rotation of the ends of each patch against each other by each mode, rad/(m·√kg)
     to_link: Array  # (modes of the link, n) modal forces on the modes of the link's file by those on these modes
     charge: Array  # (n, k) of each patch per unit of each mode, C/(m·√kg): Φ_V, also where no voltage drives it
-    yielding: Array  # (k,) what strains that modes lack add to capacitances, F
+    capacitance: Array  # (k, k) charges of patches as sensors by voltages, F
 
 
 @struct
@@ -184,7 +184,7 @@ def link_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody, spat
     placed = placed_patches(path, layouts, body)
     found = effects(key, placed, body)
     charge, turn = (np.concatenate(of).T for of in ([one.Phi_V for one in found], [one.turn for one in found]))
-    yielding, driven = np.concatenate([one.yielding for one in found]), driven_patches(placed)
+    capacitance, driven = np.concatenate([one.capacitance for one in found]), driven_patches(placed)
     arrays = {one.layout.label: _array(path, one, body, spatial, of) for one, of in zip(placed, found, strict=True)}
     reach: Reach = next(iter(arrays.values()))
     if len(layouts) > 1:
@@ -192,7 +192,7 @@ def link_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody, spat
         reach = _together(path, layouts, arrays, reached, charge.T)
     if not driven.all():
         reach = replace(reach, Phi_V=reach.Phi_V * driven)
-    own = {layouts[0].body: OnBody(charge * driven, turn, np.eye(body.mode_count), charge, yielding)}
+    own = {layouts[0].body: OnBody(charge * driven, turn, np.eye(body.mode_count), charge, capacitance)}
     # √(ρA/EI) of the mode that bends the link most softly: ω² = ∫ EI φ''² dx
     bent = np.diff(body.stations.rotation[:, 1:], axis=0) ** 2 / np.diff(body.stations.position[:, 0])[:, None, None]
     softest = (bent.sum(axis=(0, 1)) / np.diag(body.stiffness)).max(initial=0.0)
@@ -247,12 +247,14 @@ def on_pieces(
     spread = spread_of(link, list(pieces.values()))
     ends = np.cumsum([modal.mode_count for _, modal in pieces.values()])
     for (name, (start, modal)), to_piece in zip(pieces.items(), np.split(spread, ends[:-1]), strict=True):
-        (charge, turn), yielding = np.zeros((2, modal.mode_count, len(whole.driven))), np.zeros(len(whole.driven))
         on_piece = whole.placed_on(start, modal.length)
+        columns, k = [k for which, _ in on_piece for k in which], len(whole.driven)
+        (charge, turn), capacitance = np.zeros((2, modal.mode_count, k)), np.zeros((k, k))
         found = effects(_key(path, body), [placed for _, placed in on_piece], modal) if on_piece else []
         for (which, _), of in zip(on_piece, found, strict=True):
-            charge[:, which], turn[:, which], yielding[which] = of.Phi_V.T, of.turn.T, of.yielding
-        bodies[name] = OnBody(charge * whole.driven, turn, to_piece.T, charge, yielding)
+            charge[:, which], turn[:, which] = of.Phi_V.T, of.turn.T
+            capacitance[np.ix_(which, columns)] = of.capacitance
+        bodies[name] = OnBody(charge * whole.driven, turn, to_piece.T, charge, capacitance)
     return replace(whole, bodies=bodies)
 
 

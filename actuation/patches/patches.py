@@ -240,11 +240,6 @@ class PatchArray(Reach):
         """Loads c (k,) along the strain that each patch actuates, N·m/V."""
         return self.effects.per_volt
 
-    @property
-    def read_capacitance(self) -> Array:
-        """Capacitances (k,) as sensors, F."""
-        return self.layout.read_capacitance(self.effects.yielding)
-
     @cached_property
     def _stiffness(self) -> tuple[Array, Array]:
         return stiffness_ratios(PlacedLayout(self.layout, self.edges), self.link)

@@ -277,14 +277,6 @@ class PztLayout(Record):
         volume = self.length * self.width * self.thickness * self.layers * (2 if self.face == "both" else 1)
         return volume * (self.permittivity * field**2 - (self.lamina.energy if clamped else 0.0))
 
-    def read_capacitance(self, yielding: Array) -> Array:
-        """Return the capacitances (k,) of patches as sensors, F: free ones, those with open electrodes clamped.
-
-        The latter get `Effects.yielding` (k,), F, in addition, as strains that modes lack relax them.
-        """
-        is_open = self.electrodes == "open"
-        return self.capacitance(clamped=is_open) + is_open * yielding
-
     def amplifiers(self) -> Amplifiers:
         """Return the amplifiers of all k patches, with their hysteresis."""
         of, k = self.amplifier or Amplifier(), self.patch_count

@@ -36,16 +36,21 @@ def layout(**keys):
     return validate(PztLayout, PATCH | keys, SCENE)
 
 
-def test_open_patches_along_a_cantilever_under_a_force_at_its_tip(strip):
-    """EI κ = M + c V with one voltage, c ∫κ dx + C V = 0: the tip moves by (F L³/3 + c V L²/2)/EI."""
+@pytest.mark.parametrize("count", [1, 3])
+def test_open_patches_along_a_cantilever_under_a_force_at_its_tip(strip, count):
+    """EI κ = M + c V, c ∫κ dx + C V = 0 on each patch of length l: the tip moves by (F L³/3 + Σ c V l (L − x))/EI."""
+    keys = {"centers": [L * (k + 0.5) / count for k in range(count)], "length": L / count}
     A, S, I = (2 * B * np.diff([(H / 2) ** k, (H / 2 + T_P) ** k])[0] / k for k in (1, 2, 3))  # noqa: E741
     EI, c = E * B * H**3 / 12 + E_P * I, E_P * D31 * S / T_P
-    C = A * L / T_P**2 * (EPS - E_P * D31**2)
-    V = -c * L**2 / 2 / (C * EI + c**2 * L)
-    for electrodes, expected in (("shorted", L**3 / 3 / EI), ("open", (L**3 / 3 + c * V * L**2 / 2) / EI)):
-        body = patched(strip, layout(electrodes=electrodes))
+    C = A * L / count / T_P**2 * (EPS - E_P * D31**2)
+    arm = L / count * (L - np.array(keys["centers"]))  # ∫ (L − x) dx
+    V = -c * arm / (C * EI + c**2 * L / count)
+    for electrodes, expected in (("shorted", L**3 / 3 / EI), ("open", (L**3 / 3 + c * V @ arm) / EI)):
+        body = patched(strip, one := layout(electrodes=electrodes, **keys))
         tip = body.points["tip"].translation[1]
         assert tip**2 @ (1.0 / body.stiffness) == pytest.approx(expected, rel=1e-6)
+    volts = volts_on_file(link_patches(SCENE, [one], strip, body), "strip")["strip"] @ body.modal_transform
+    assert volts @ (tip / body.stiffness) == pytest.approx(-V, rel=1e-6)
 
 
 @pytest.mark.parametrize("share", [0.3, 1.0, 4.0])
