@@ -37,7 +37,7 @@ ROUND_OFF = 1e-6  # of the largest modal force: less is what ill-conditioned pat
 class Unsupplied:
     """Path error of motors and patches that cannot supply the modal forces of a path."""
 
-    bodies: tuple[str, ...]  # links with too few patches or actuation points for the modal forces required, or none
+    bodies: tuple[str, ...]  # links with too few patches or actuation points, or none
     with_patches: bool  # whether any link has patches
     point: str = ""  # that with the largest error: on trajectories, or of any body where these are of angles
     # m, largest distance of `point` from its path where the motors keep the computed angles, quasi-static
@@ -45,12 +45,12 @@ class Unsupplied:
     at_start: float = 0.0  # m, likewise at the first output: the sag of the links
     # m, likewise where motors repeat the computed torques: the first vibration, without the drift that follows
     moments_repeated: float = 0.0
-    # 1/s, growth rate of deviations under these torques (`open_loop_growth`); 0 where none grows, nan if unknown
+    # 1/s, growth rate of deviations under these torques; 0 where none grows, nan if unknown
     growth: float = 0.0
     families: tuple[str, ...] = ()  # in 3D, for each of `bodies`: those of its modes with unmet forces r
-    # in 3D, m, for each of `bodies`: largest |Φ K⁻¹ r| of its points, quasi-static, with the supports of its modes
+    # deflection, rotation: in 3D, m and rad, for each of `bodies`: largest |Φ K⁻¹ r|, |Φ_r K⁻¹ r| of its points
     deflection: tuple[float, ...] = ()
-    rotation: tuple[float, ...] = ()  # in 3D, rad, for each of `bodies`: largest |Φ_r K⁻¹ r| of its sections
+    rotation: tuple[float, ...] = ()
 
     @property
     def drift(self) -> str:
@@ -159,19 +159,18 @@ class PatchFeasibility:
     """Requirements on the patches of one layout in one analysis; k patches, n modes, peaks over time.
 
     Attributes:
-        required_moment: (k,) N·m at the required voltage, `PatchArray.moment_per_volt` times it.
+        required_moment: (k,) N·m at the required voltage.
         available_moment: (k,) N·m at the limit.
         saturation_time: (k,) s, when a limit is first exceeded; NaN where none is.
         slew: (k,) V/s, largest of the required voltage, mean between outputs.
         slew_limit: (k,) V/s.
-        current: (k,) A, largest at the required voltage and strain, mean between outputs.
+        current: (k,) A, largest, mean between outputs.
         current_limit: (k,) A.
         field: (k,) V/m in a layer at the required voltage.
         limited_field: (k,) V/m at the voltage within the limit.
-        strain: (k,) of the outer surface, from the bending of the link, its mean along the patch.
+        strain: (k,) of the outer surface by bending of the link, mean along the patch.
         mode_required: (n,) N/√kg, largest modal force.
         mode_available: (n,) N/√kg, modal force with every patch at its limit.
-        find_remedies: computes `remedies`.
     """
 
     required_moment: Array
@@ -243,8 +242,7 @@ def judge_patches(
     """Return the requirements on the patches of one layout.
 
     Modal coordinates p (T, n), m·√kg, and required forces F_p (T, n), N/√kg, are on the modes of the layout at `time`
-    (T,), s. `with_count(k)` is the largest voltage (V) of k such patches, evenly spread, None where they have no room;
-    without this function no other numbers of patches are tried.
+    (T,), s. `with_count(k)`, if any, is the largest voltage (V) of k such patches, None where they have no room.
     """
     amplifiers, layout, pace = patches.amplifiers, patches.layout, 1.0 / np.diff(time)[:, None]
     required, limit = worst(voltages.required, amplifiers.range)
@@ -339,8 +337,8 @@ def judge_actuators(
 ) -> Feasibility:
     """Return the requirements on motors by joint ("JOINT 2" of a second coordinate) and on patches by layout.
 
-    `path` is that of the scene file, `patches` are by link, `voltages` by layout. `others`: links that need no patches,
-    as forces at their actuation points act.
+    `path` is that of the scene file, `patches` are by link, `voltages` by layout. `others` need no patches, as forces
+    at actuation points act on them.
     """
     judged: dict[str, PatchFeasibility] = {}
     for body, of_link in patches.items():
@@ -355,7 +353,7 @@ def judge_actuators(
 
 
 def _largest_voltage(path: Path, run: Run, link: LinkInMotion, layout: PztLayout, count: int) -> float | None:
-    """The voltage, V, that `count` patches of a layout would need alone, evenly spread; None if they have no room."""
+    """The voltage, V, that `count` such patches need alone, evenly spread; None if they have no room."""
     from .patches.link_patches import on_kept_modes, with_count
     from .patches.patches import voltage_gain
 
@@ -394,7 +392,7 @@ def find_unsupplied(
 ) -> Unsupplied | None:
     """Return the path error by modal forces that voltages cannot supply; None if these bend no link.
 
-    Arguments as of `judge_actuators`: links among `others` do not count.
+    `patches` are by link, `voltages` by layout; links among `others` do not count.
     """
     largest = max((float(np.abs(link.F_p).max(initial=0.0)) for link in links.values()), default=0.0)
     unsupplied: list[tuple[float, float, str, str]] = []

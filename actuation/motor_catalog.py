@@ -43,10 +43,7 @@ class _Catalog(Record):
 
 
 class JointTask(NamedTuple):
-    """Task of a joint over `time` (T,), s: `load` (T,), N·m or N, without any rotor; rate and acceleration (T,).
-
-    The rate is in rad/s or m/s, the acceleration in rad/s² or m/s².
-    """
+    """Task of a joint over `time` (T,), s: `load` without rotor, N·m or N, rate, rad/s, acceleration (T,), rad/s²."""
 
     time: Array
     load: Array

@@ -35,7 +35,7 @@ class MotorFeasibility:
     power_limit: float
     saturation_time: float  # when a limit is first exceeded, s; NaN where none is
     # root mean square from t = 0 to the end of the analysis (thermal-equivalent torque)
-    rms_moment: float = np.nan  # this field and all below are not in files of version 0.1
+    rms_moment: float = np.nan  # from here on not in files of version 0.1
     usual_moment: float = np.nan  # not exceeded for 99 % of the time, pre- and post-actuation included
     moment_time: float = np.nan  # when the torque is largest, s
     share_beyond: float = np.nan  # share of the time on the path beyond any limit
@@ -43,8 +43,7 @@ class MotorFeasibility:
     # (kg); NaN where loops share it among joints
     load_inertia: float = np.nan
     jump: str = ""  # "acceleration" or "jerk" of the path if its jump causes a short peak; else ""
-    # largest torque at rest along the path, which a slower path does not reduce; NaN if all are within the limit, or
-    # not known
+    # largest torque at rest along the path, which a slower path does not reduce; NaN if within limits, or not known
     static_moment: float = np.nan
 
     @property
@@ -168,8 +167,7 @@ def first_time(time: Array, beyond: Booleans) -> Array:
 def path_jump(run: Run, at: float) -> str:
     """Return which derivative of a trajectory jumps near the time `at` (s), so that torques jump, too.
 
-    The result is "acceleration", in motors-only analyses also "jerk", or "" without a jump. A path is constant before
-    t = 0 and after its end.
+    That is "acceleration", in motors-only analyses also "jerk", else "". Before t = 0 and after the end paths rest.
     """
     end = run.analysis.last_time
     if end <= 0.0 or len(run.time) < 2:

@@ -73,10 +73,10 @@ class PointSet:
     """Components of force, c in all, at points of one body with n modes; SI units."""
 
     body: str  # its name
-    names: tuple[str, ...]  # of the point of each component
-    axes: tuple[str, ...]  # "x", "y" or "z" of the body, along which each component acts
-    points: tuple[BodyPoint, ...]  # point of each component, with shapes of the modes in the equations
-    scale: Array  # (6 + n,) factors that make generalized forces of the body forces in N: 1, 1/length, √mass
+    names: tuple[str, ...]  # of each component's point
+    axes: tuple[str, ...]  # "x", "y" or "z" of the body along which each component acts
+    points: tuple[BodyPoint, ...]  # point of each component
+    scale: Array  # (6 + n,) factors from generalized forces to forces in N: 1, 1/length, √mass
 
     @property
     def direction(self) -> Array:
@@ -89,10 +89,7 @@ class PointSet:
         return self.direction, position, np.vstack([point.translation for point in self.points]), self.scale
 
     def L_a(self, p: Array) -> Array:
-        """Return generalized forces (T, 6 + n, c) of components of 1 N at modal coordinates p (T, n), m·√kg.
-
-        They are force, N, and moment, N·m, on the frame in body axes, and forces on modes, N/√kg.
-        """
+        """Return generalized forces (T, 6 + n, c), N·m, N/√kg, of components of 1 N at p (T, n), m·√kg; body axes."""
         e, columns = self.direction, []
         for k, point in enumerate(self.points):
             u = point.position + p @ point.translation.T

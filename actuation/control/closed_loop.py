@@ -204,8 +204,8 @@ def loops_about(
 ) -> tuple[list[tuple[LinearModel, Feedback]], Mapping[float, Feedback]]:
     """Return the linear `models`, each with the linear controllers at its time; and controllers by time (s).
 
-    The latter are those at the start, or at each time of an observer's schedule. Both are empty where a controller is
-    not linear at the time of a model. `readings` (K, outputs), in units of the sensors, show how far a run deviates.
+    The latter are at the start, or at each time of an observer's schedule. Both are empty where a controller is not
+    linear at the time of a model. `readings` (K, outputs), in units of sensors, show how far a run deviates.
     """
     observed = controllers[0] if controllers and isinstance(controllers[0], Observed) else None
     acting, asked = (setup, controllers) if observed is None else (observed.setup, observed.controllers)
@@ -250,10 +250,7 @@ def _feed_forward(
     *,
     whole: bool = False,
 ) -> Array:
-    """Torques and voltages (K, inputs) of the inverse analysis, in the middle of the time for which each is held.
-
-    Those that are fed forward, or, `whole`, all.
-    """
+    """Torques and voltages (K, inputs) that are fed forward, in the middle of each sample's time; `whole`: all."""
     middle = np.minimum(times + analysis.delay + analysis.sample_time / 2, source.time[-1])
     most = largest_moments(context.model, limits=False)
     values = supplied(source, most, context.patches, limited=not analysis.unlimited).sample(middle.tolist())
@@ -311,8 +308,7 @@ def _followed(
 def _place_of_tip(analysis: ClosedLoop, model: Model, source: Run, tip: str) -> Callable[[Array], Array]:
     """Where the tip should be (T, d), m, at times (T,), s: on its paths, constant before 0 and after their end.
 
-    Without a path where it is in the inverse analysis. There it may ring: from when all paths are over, its place is
-    the final position.
+    Without a path where it is in the inverse analysis until all paths end, then the final position.
     """
     paths = [path.components for path in model.scene.trajectory if path.point == tip]
     run, rest = source.closer, commanded_rest(source)
@@ -337,7 +333,7 @@ def _position(model: Model, q: Array, point: str) -> Array:
 LONGEST, FEWEST = 64, 12  # samples that are looked at
 AT, LATER = 1, 4  # sample at which readings are off: the first may be special; and that of all together
 SIZES = 1e-4, 1e-7, 1e-10  # of how far readings are off in the run, until commands are linear in them
-LINEAR = 0.02  # of the largest change of each command: what several readings may change of their sum, later and twice
+LINEAR = 0.02  # of the largest change of each command: error of the sum of changes, later and of twice the size
 RANK = 1e-8  # of the largest singular value: less is round-off
 SAME = 1e-3  # of the largest response: what the states found may leave of it
 
@@ -345,9 +341,9 @@ SAME = 1e-3  # of the largest response: what the states found may leave of it
 def find_feedback(setup: Setup, controllers: Sequence[Controller], readings: Array, first: int) -> Feedback | None:
     """Linearize controllers about the reference from sample `first` on; None if nonlinear, changing, or of many states.
 
-    Each reading deviates at one sample alone, by much less than `readings` (K, outputs) of a run do. The change of the
-    commands is the impulse response of the controllers; its Hankel matrix has their states as factors (B. L. Ho and
-    R. E. Kalman, Regelungstechnik 14, 1966; S. Y. Kung, Asilomar Conf. 1978).
+    Each reading deviates at one sample, by much less than `readings` (K, outputs) of a run. The Hankel matrix of this
+    impulse response has the controllers' states as factors (B. L. Ho and R. E. Kalman, Regelungstechnik 14, 1966; S. Y.
+    Kung, Asilomar Conf. 1978).
     """
     count = min(LONGEST, len(setup.times) - first)
     if count < FEWEST:

@@ -1,19 +1,7 @@
 """Controllers: joint PID, modal velocity, linear-quadratic, computed torque, functions of Python; their protocol.
 
-A user's own controller is a function of the setup, in a Python file, that returns the function of samples:
-
-    def controller(setup):                 # actuation.control.robot.Setup
-        gamma = setup.columns("joint/O")   # where readings are in y, by name
-        tau = setup.places("joint/O")      # where commands are in u
-
-        def at_sample(k, y):               # sample number, readings (outputs,)
-            u = np.zeros(len(setup.inputs))
-            u[tau] = 100 * (setup.reference[k, gamma] - y[gamma])
-            return u                       # added to setup.feed_forward[k], then cut at the limits
-
-        return at_sample
-
-It reads the sensors of the scene.
+A user's own controller is a function of the setup, in a Python file, that returns u = at_sample(k, y); see
+docs/howto/control.md.
 """
 
 from __future__ import annotations
@@ -211,8 +199,8 @@ def _in_words(error: BaseException) -> str:
 def load_function(reference: str, folder: Path) -> Callable[[Setup], Callable[[int, Array], Array]]:
     """Return the function of "FILE.py:FUNCTION" of a scene in `folder`.
 
-    Its imports from below `folder` count among `python_files.imported_files`. Raises `InputError` where the file fails
-    or does not have the function.
+    It makes the controller u (inputs,) = f(k, y (outputs,)), SI units, from the setup. `python_files.imported_files`
+    lists its imports from below `folder`. Raises `InputError` where the file fails or lacks the function.
     """
     path, _, name = reference.rpartition(":")
     count_imports(folder, Path(path).parent)

@@ -38,8 +38,7 @@ class LinearModels(Details):
     `controllable`: by motors and patches together; `observable`: by joints and points together; `zeros` by
     (inputs, outputs): from each motor to its own joint and to each coordinate of a point, from all motors to their
     joints (the frequencies with locked joints), and to as many coordinates of a point. `suggested`: gains of joint PD
-    controllers for all models and the longest sample time (s) for them. `conditions` of joints by name: see
-    `joint_conditions`.
+    controllers for all models and the longest sample time (s) for them. `conditions`: see `joint_conditions`.
     """
 
     models: tuple[LinearModel, ...]

@@ -195,7 +195,7 @@ def state_space(
 
 
 def is_kept(name: str, modes: int) -> bool:
-    """Whether a coordinate or reading, by name, does not belong to a mode above the lowest `modes` of its link."""
+    """Return false for names of modal coordinates beyond the lowest `modes` of a link, else true."""
     kind, *rest = name.split("/")
     return kind != "modal" or int(rest[1]) <= modes
 
@@ -234,7 +234,7 @@ def save_arrays(arrays: Mapping[str, Any], path: Path) -> None:
 
 
 def read_arrays(path: Path, names: Sequence[str]) -> list[Array]:
-    """Read matrices of a .npz or .mat file by name. Raises `InputError` where it cannot be read or lacks one."""
+    """Read matrices (rows, columns), any unit, of a .npz or .mat file by name. Raises `InputError` where one lacks."""
     try:
         if path.suffix == ".mat":
             held: Mapping[str, Any] = scipy.io.loadmat(path)
@@ -303,10 +303,7 @@ def observability(model: LinearModel, outputs: Names) -> Reachability:
 
 
 def _scaled(columns: Array, names: Sequence[str]) -> Array:
-    """Columns (f, names) over their size, of a point over that of all its directions: axes do not matter.
-
-    None of what is still to round-off next to the largest of its kind.
-    """
+    """Columns (f, names) over their size, of a point over that of all its directions; none that are round-off."""
     if not columns.size:  # a robot that cannot move
         return columns
     groups = [name.rpartition("/")[0] if name.startswith(("point/", "force/")) else name for name in names]
@@ -347,10 +344,10 @@ def _reach(model: LinearModel, columns: Array, left: bool) -> Reachability:
     return Reachability(measure, lost)
 
 
-INFINITE = 1e3  # times the largest pole: zeros beyond belong to modes that the model has not
+INFINITE = 1e3  # times the largest pole: zeros beyond are of modes that the model lacks
 MARGIN = 1e-6  # of a zero's size (and MARGIN of the largest pole, for those near 0): real parts below are round-off
 ROUND_OFF = 1e-13  # of a pencil, relative: what its entries and QZ leave of double precision
-RESOLVED = 1e-3  # relative error of zeros: those that round-off moves by more may as well be infinite
+RESOLVED = 1e-3  # relative error of zeros by round-off: with more they count as infinite
 
 
 @struct
@@ -526,12 +523,12 @@ def riccati(A: Array, B: Array, Q: Array, R: Array, within: float = 1.0) -> Arra
 def by_doubling(A: Array, B: Array, X: Array) -> Array | None:
     """Return X (n, n) = AᵀXA − AᵀXB (1 + BᵀXB)⁻¹ BᵀXA + Q by doubling; A (n, n), B (n, m), argument `X` is Q (n, n).
 
-    Step k makes 2ᵏ of the Riccati recursion (B. D. O. Anderson, Int. J. Control 28, 1978, 295–306). None where it does
-    not converge, or 1 is below round-off of BᵀXB. Units are consistent.
+    Step k makes 2ᵏ of the Riccati recursion (B. D. O. Anderson, Int. J. Control 28, 1978, 295–306), in any units. None
+    where it does not converge, or 1 is below round-off of BᵀXB.
     """
     unit, G = np.eye(len(A)), B @ B.T
     with np.errstate(all="ignore"), suppress(np.linalg.LinAlgError):
-        for _ in range(40):  # errors of filters that die out, however slowly, are gone by then
+        for _ in range(40):  # slow errors of filters are gone by then
             W, before = unit + G @ X, X
             through = np.linalg.solve(W.T, A.T).T
             X, G = X + A.T @ X @ np.linalg.solve(W, A), G + through @ G @ A.T

@@ -32,7 +32,7 @@ from .records import JointPid, SampledAnalysis
 from .robot import Setup
 from .signals import Filter, Signal
 
-JITTER = 20.0  # times noise and resolution of a sensor: less than so much of motion it may not see
+JITTER = 20.0  # times noise and resolution of a sensor: less motion it may not see
 SAMPLES_PER_PERIOD = 10  # of the fastest motion that a controller acts on (Franklin, Powell and Workman ask for 20)
 
 
@@ -139,7 +139,7 @@ class AmplifiedLoop:
 def measure(run: LoopMotion, setup: Setup, loop: Loop, lowest: float, is_stable: bool | None) -> Metrics:
     """Return the metrics of a run; `lowest`: frequency of the robot with joints controlled or locked, Hz, or NaN.
 
-    `is_stable` says whether the sampled linear loop is stable; None if not known.
+    `is_stable`: whether the sampled linear loop is stable; None if not known.
     """
     t, motors = run.time, len(setup.robot.motors)
     distance = np.linalg.norm(run.error, axis=1)
@@ -185,7 +185,6 @@ class LoopRecord(Details):
         tip_error_peak_time: s, when the tip error is largest.
         margins: by the linear model; None where controllers, or the robot, are not linear.
         poles: eigenvalues (n,) of the linear loop at the start, from sample to sample.
-        warnings: one line each.
         advice: what to try, a text each, where the loop is not stable.
         feedback: controllers as a linear law about the reference, by time (s): at the start, or along a schedule.
         tip_error: (T,) m at the outputs of the run.

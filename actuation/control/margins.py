@@ -26,7 +26,7 @@ FEW, MOST = 150, 600  # eigenvalues of a loop: margins are sought for so many; f
 GRID = 60  # points of the search for the first crossing, before bisection
 LIGHTLY = 0.2  # damping ratio, above which motion of a loop is no vibration
 GONE = 1e-6  # eigenvalues below are commands on their way
-ALIAS = 1e-3  # of an eigenvalue: how near it is to that of a vibration that samples are too rare for, and no other
+ALIAS = 1e-3  # of an eigenvalue: distance to that of a vibration too fast for the samples
 SAMPLED = 0.99  # of half the sampling frequency, where eigenvalues are that of no motion
 RIGID = 1e-6  # of the fastest eigenvalue: slower ones are round-off of motion without stiffness
 
@@ -53,10 +53,7 @@ class Feedback:
         return replace(self, C=factor * self.C, D=factor * self.D)
 
     def behind(self, A: Array, B: Array, C: Array, D: Array) -> Feedback:
-        """Return the law with discrete filters A (m, m), B (m, p), C (p, m), D (p, p) of its p readings; SI units.
-
-        States of the filters come last.
-        """
+        """Return the law with discrete filters A (m, m), B (m, p), C (p, m), D (p, p), SI, of its readings."""
         if not len(A):
             return self
         whole = np.block([[self.A, self.B @ C], [np.zeros((len(A), len(self.A))), A]])
@@ -120,9 +117,9 @@ def lowest_frequency(
 ) -> float:
     """Return the lowest frequency of the robot with controlled or locked joints, Hz; NaN if nothing vibrates.
 
-    It is the lowest with all motors locked and, where joints have PID controllers alone, of the sampled loop:
-    eigenvalues e^{sT} with damping ratios below `LIGHTLY`. With other controllers it is half of the lowest with motors
-    locked. `T` is the sample time, s, `delay` that of commands, s.
+    It is the lowest with locked motors and, with PID controllers of joints alone, of the sampled loop (sample time T,
+    `delay` of commands, s) with damping ratios below `LIGHTLY`; with other controllers half of the lowest with locked
+    motors.
     """
     locked = min((float(locked_frequencies(model).min(initial=np.inf)) for model in models), default=np.inf)
     pids = [record for record in controllers if isinstance(record, JointPid)]
@@ -224,9 +221,9 @@ def _last_before(changed: Callable[[float], bool], values: Array, missing: float
 FRACTION = 1 / 3  # of the lowest frequency with locked motors
 SAMPLES = 30  # a period of the bandwidth, at least
 SPARE = 2.0  # by which suggested gains may grow
-NARROW = 1.5  # gain margin below which a loop that is stable at some places of the path may well not be at others
+NARROW = 1.5  # gain margin below which a loop may be unstable elsewhere on the path
 SAMPLE_TIMES = (1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)  # s
-LIGHT = 0.02  # of the inertia with rigid links: what a joint feels at once, below which its root has no inertia
+LIGHT = 0.02  # of the inertia with rigid links, below which the root of a link has none
 
 
 @struct

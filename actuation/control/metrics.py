@@ -57,7 +57,7 @@ class Metrics:
     peak_voltage: float  # V
     saturated: float  # part of the samples at which a command is at its limit
     # way of the tip beyond its final place along the line from the first place to it, m
-    overshoot: float = np.nan  # this field and those below are not in files of version 0.1
+    overshoot: float = np.nan  # from here on not in files of version 0.1
     # about which vibration is measured, Hz, see `ringing`; NaN where the linear model has none
     lowest_frequency: float = np.nan
     vibration_window: float = np.nan  # time before the end of the run from which slower motion is fitted, s
@@ -113,7 +113,7 @@ def resting(place_at: Callable[[Array], Array], time: Array) -> tuple[Array, Arr
 
 
 def watched(end: float, window: float, lowest: float) -> Array:
-    """Return 2 `WATCHED` + 1 times, s, in the `window` (s) before `end`, half of them in one period of `lowest` Hz."""
+    """Return times (2 `WATCHED` + 1,), s, in the `window` (s) before `end`, half of them in a period of `lowest` Hz."""
     begin = end - (min(window, 1.0 / lowest) if lowest > 0.0 else window)
     before = np.linspace(end - window, begin, WATCHED, endpoint=False)
     return np.concatenate([before, np.linspace(begin, end, WATCHED + 1)])
@@ -148,7 +148,7 @@ def vibration(time: Array, error: Array, window: float, lowest: float) -> float:
 def overshoot(time: Array, place: Array, error: Array) -> float:
     """Return how far (m) the tip, at `place` + `error` (T, d), m, over `time` (T,), s, passes its final position.
 
-    The overshoot is along the line from the first place to the final one.
+    This is along the line from its first place.
     """
     way = place[-1] - place[0]
     length = float(np.linalg.norm(way))
@@ -184,10 +184,7 @@ def settling(t: Array, distance: Array) -> float:
 
 
 def _last_crossing(t: Array, values: Array, level: float) -> float:
-    """When (s) `values` (T,) last come down to `level`, on the cubic through four of them; NaN where they end above it.
-
-    The first of the times (T,) where they are never above it.
-    """
+    """When (s) `values` (T,) last come down to `level`, by a cubic; NaN if they end above it, else the first time."""
     above = np.flatnonzero(values > level)
     if not above.size:
         return float(t[0])
@@ -222,7 +219,7 @@ def verdict_of(
 
     `cut` (K, inputs) is ±1 where commands are at limits, else 0. `asked`: times (K,), s, of samples and their largest
     command (K,), relative to the largest of all. `lowest` is the frequency, Hz, about which vibration is measured.
-    `is_seen`: the motion exceeds noise and resolution of the sensors, so that "not settled" is a finding.
+    `is_seen`: the motion exceeds noise and resolution of the sensors, else it counts as settled.
     """
     if not run.completed:
         return "diverges"

@@ -35,7 +35,7 @@ from .signals import Signal, filters, make_signals, merged, readings_at
 
 FAR = 1e9  # times the largest reading off its reference: such estimates diverge
 HIDDEN = 1e-7  # of the largest singular value
-DECAYS = 1.0 - 1e-10  # eigenvalues of errors that die out; what no sensor sees is at 1, to round-off
+DECAYS = 1.0 - 1e-10  # eigenvalues of decaying errors; what no sensor sees is at 1, to round-off
 NAMED = 0.1  # of the largest entry of a vector of states
 
 
@@ -169,7 +169,7 @@ def _covariance(A: Array, C: Array, Q: Array, R: Array, states: Sequence[str]) -
 def hidden(A: Array, C: Array, names: Sequence[str]) -> list[str]:
     """Return `names` of the n states of x(k+1) = A x in motions that do not decay and that readings C x do not show.
 
-    A is (n, n), C (p, n). By the test of Popov, Belevitch and Hautus, with states scaled, as their units are arbitrary.
+    A is (n, n), C (p, n), in any units. By the Popov–Belevitch–Hautus test.
     """
     found: dict[str, None] = {}
     A, (scale, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
@@ -376,7 +376,7 @@ def kalman_filters(
     sensors: Sequence[Sensor],
     more: Sequence[Sensor],
 ) -> tuple[Schedule, list[str]]:
-    """Return filters at instants of the path that estimate `more`, and warnings of modes that `sensors` cannot see.
+    """Return filters along the path that estimate readings of `more`, and warnings of modes that `sensors` cannot see.
 
     Raises `InputError` as `kalman` does.
     """
@@ -400,8 +400,8 @@ def make_observed(
 ) -> Observed:
     """Make the observer with the controllers that act on its estimates.
 
-    `reference` (K, estimates): true values on the reference; `ranges` (2, inputs): limits of commands; `nominal`
-    (K, inputs): commands of the reference; SI units. Raises `InputError` where the observer does not fit the robot.
+    On the reference: true values `reference` (K, estimates), commands `nominal` (K, inputs); `ranges` (2, inputs):
+    limits of commands; SI units. Raises `InputError` where the observer does not fit the robot.
     """
     record, robot = analysis.observer, setup.robot
     tip, origin = analysis.tip or default_tip(robot.model), setup.reference

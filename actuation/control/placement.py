@@ -37,8 +37,8 @@ from .records import FilterRecord, Sensor, check_sampling
 from .robot import default_tip, whole_robot
 from .signals import Signal, make_signals
 
-SHARE = 0.1  # of a mode's strain energy in the link, for the mode to be its business
-CHUNK = 200  # sets whose voltages over the path are held in memory together
+SHARE = 0.1  # of a mode's strain energy in the link, for the mode to count
+CHUNK = 200  # sets whose voltages over the path are in memory together
 SEED = 0  # of the evolution: the same scene gives the same patches
 
 
@@ -49,7 +49,7 @@ class PatchableLink:
     array: PatchArray  # patches of the layout where the scene has them, on p
     bodies: tuple[str, ...]  # bodies with the modal coordinates of the link in linear models: itself, or its pieces
     own: Array  # (m, n) p from the modal coordinates of the `bodies`, side by side, as linear models have them
-    # function from keys "count" or "centers" to patches; raises `InputError` where they do not fit the link
+    # function of keys "count" or "centers"; raises `InputError` where patches do not fit the link
     patches: Callable[..., PatchArray]
 
 
@@ -112,9 +112,8 @@ def place(
 
     The criterion needs a `model` (controllability), modal forces F_p (T, m), N/√kg (voltage), or the `deviation`, m, of
     the estimated tip by readings (m, count), V/(m·√kg), of patches. Controllability of a mode is Σ (φᵀ b_k)² over the
-    patches, b_k the modal forces of a patch per volt, relative to the best single patch. The gramian is proportional
-    to it under light damping (Gawronski, Advanced Structural Dynamics, 2004, ch. 4). Raises `InputError` where there is
-    no room.
+    patches, b_k the modal forces of a patch per volt, relative to the best single patch (Gawronski, Advanced Structural
+    Dynamics, 2004, ch. 4). Raises `InputError` where there is no room.
     """
     key, layout = f"{scene_path}: placement", link.array.layout
     stiffness, served = link.array.modes.stiffness, link.array.served
@@ -198,8 +197,7 @@ def _voltages(shape: Array, Phi_V: Array, F_p: Array) -> Array:
 def _search(room: int, offset: Indices, most_sets: int, judge: Callable[[Indices], Array]) -> tuple[Indices, int, str]:
     """The best set of candidates (count,), the number of sets compared, and the method.
 
-    Of y_1 ≤ y_2 ≤ … below `room`, the candidates less the `offset` (count,) of the patches before them: every such set
-    is free of overlap.
+    Candidates are y_1 ≤ y_2 ≤ … below `room` plus the `offset` (count,) of the patches before: they never overlap.
     """
     count = len(offset)
     if comb(room + count - 1, count) <= most_sets:
@@ -344,7 +342,7 @@ class PatchPlacement(InstantAnalysis):
         yield from self.placement.references()
 
     def problems(self, among: Surroundings) -> Iterator[str]:
-        """Yield a message, a line each, if `about` lacks the modal forces or the model that the criterion needs."""
+        """Yield a message if `about` lacks the modal forces or the model that the criterion needs."""
         if not self.is_over_path:
             if self.instants is not None and len(self.instants) != 1:
                 yield f"times: expected one time to place patches for, found {len(self.instants)}"

@@ -221,10 +221,7 @@ class GainsObserver(ObserverRecord):
 
     @property
     def matrices(self) -> tuple[Any, Any, Any, Any]:
-        """A (n, n), B (n, inputs), C (outputs, n), gain (n, outputs), in units of the scene or file.
-
-        Raises `InputError` where the file lacks one.
-        """
+        """A (n, n), B (n, inputs), C (outputs, n), gain (n, outputs), any unit; `InputError` if the file lacks one."""
         if self.file is None:
             return self.A, self.B, self.C, self.gain
         from .linear_model import read_arrays
@@ -241,7 +238,7 @@ class ControllerRecord(Referring):
 
 
 class JointPid(ControllerRecord):
-    """u = P e + D ė + I ∫e for each joint, e its error from the reference; N·m/rad, N·m·s/rad, N·m/(rad·s); N, m."""
+    """u = P e + D ė + I ∫e for each joint, with the error e from the reference."""
 
     kind: Literal["joint-pid"]
     proportional: dict[Name, NotNegative] = Field(default_factory=dict)
@@ -446,7 +443,7 @@ class SampledAnalysis(ActuatedAnalysis):
                 yield f"disturbance no. {k}: {component}", function, 0
 
     def replay_problems(self, source: Analysis) -> Iterator[str]:
-        """Yield a message, a line each, if `source` lacks inputs to feed forward, or ends before a design's instant."""
+        """Yield a message if `source` lacks inputs to feed forward, or ends before the instant of a design."""
         designed = [(f"controller no. {k}", record) for k, record in enumerate(self.controller, 1)]
         for label, record in (*designed, ("observer", self.observer)):
             if isinstance(record, Lqr | KalmanObserver) and record.time > source.last_time * (1 + 1e-9):

@@ -1,4 +1,4 @@
-"""Robots as controllers use them: names, sensors, links, patches, linear and rigid models, and the setup."""
+"""Robots as controllers use them: names, sensors, links, patches, linear and rigid models."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -39,8 +39,7 @@ def rigid_freedom(model: Model) -> int:
 class RigidArm:
     """Robot with rigid links: torques τ(γ, γ̇, γ̈), SI, of all motors, with rotors and friction, without loads.
 
-    They are the multipliers of γ = γ(t), affine in γ̈: one evaluation with γ̈ = 0, one for each motor. `q` (n_q,), m and
-    rad: the first configuration of `model`. Raises `InputError` where the motors do not fit its DOF.
+    `q` (n_q,), m and rad, is the first configuration of `model`. Raises `InputError` where motors do not fit its DOF.
     """
 
     def __init__(self, model: Model, q: Array) -> None:
@@ -130,7 +129,7 @@ def _rigid(body: Body) -> Body:
 class PatchSignals:
     """The k patches of one link, and the m uncoupled modal coordinates that they excite, the lowest first."""
 
-    inputs: tuple[str, ...]  # names of the patches' voltages, which are those of their readings, too
+    inputs: tuple[str, ...]  # names of the voltages, and of the readings
     omega: Array  # (m,) rad/s, natural frequencies of these coordinates
     gain: Array  # (k, m) V√kg/N, voltages per force on each of these coordinates
     volts: Array  # (k, m) V/(m·√kg), readings per unit of each coordinate
@@ -198,10 +197,7 @@ class ControlledRobot:
         return signals
 
     def linear(self, row: int, points: Mapping[str, str] = MappingProxyType({})) -> LinearMechanism:
-        """Linearize about output no. `row` of the motion; motors, voltages and forces at `points` are inputs.
-
-        `points`: where each "BODY.POINT" is in the model.
-        """
+        """Linearize about output no. `row`; inputs are motors, voltages, forces on `points` (of the model, by name)."""
         moved = with_motor_coordinates(self.source, self.plant)
         linearisation = LinearEquations(self.plant, moved.q[row], points)
         found = linearisation.at(float(self.source.time[row]), moved.q[row], moved.v[row], moved.a[row])
@@ -292,7 +288,7 @@ class Setup:
         times: (K,) of the samples, s.
         sample_time: s.
         delay: s, after which a command acts.
-        reference: (K, outputs) readings of the sensors on the motion of `source`.
+        reference: (K, outputs) readings on the motion of `source`.
         feed_forward: (K, inputs) commands to which those of controllers are added.
         source: run of the inverse analysis.
     """

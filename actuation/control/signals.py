@@ -54,7 +54,7 @@ class Sensing:
         self._linear = np.array([k for k, signal in enumerate(read) if not signal.point], dtype=int)
         self._order = np.array([read[k].order for k in self._linear], dtype=int)
         self._along = np.reshape([read[k].along for k in self._linear], (len(self._linear), tree.n_v))
-        # (n_v,) where in q the coordinate of each rate is; of orientations, which nothing reads so, some other place
+        # (n_v,) index in q of the coordinate of each rate; for orientations another one, which nothing reads
         self._where = np.zeros(tree.n_v, dtype=np.intp)
         for node in tree.nodes:
             if node.joint.q_count == node.joint.freedoms:

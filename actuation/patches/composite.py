@@ -2,12 +2,12 @@
 
 Under the strains e = (φ_z', u', φ_x', −φ_y') of the axis and a voltage V the layers at one place take the loads
 
-    P = f V − C e     (`layer_loads`; in the plane e = (φ', u'), C = E_p [[I, −S], [−S, A]], f = (c, ∓E_p d31 w N))
+    P = f V − C e
 
-(Crawley and de Luis, AIAA J. 25, 1987, 1373–1385). The modes lack the steps of curvature at the ends of patches. These
-residual strains are static and known: a load in one section of an isostatic link strains that section alone, by 1/EI,
-1/EA, 1/GJ, of which the modes, with strains B p, have B K⁻¹ Bᵀ. At Gauss points of weights w, with C and f for the
-length w of each,
+(`layer_loads`; Crawley and de Luis, AIAA J. 25, 1987, 1373–1385). The modes lack the steps of curvature at the ends of
+patches. These residual strains are static and known: a load in one section of an isostatic link strains that section
+alone, by 1/EI, 1/EA, 1/GJ, of which the modes, with strains B p, have B K⁻¹ Bᵀ. At Gauss points of weights w, with C
+and f for the length w of each,
 
     e = B p + R P,    R = diag(1/(w EI), 1/(w EA) …) − B K⁻¹ Bᵀ,    P = (1 + C R)⁻¹ (f V − C B p)
 
@@ -57,7 +57,7 @@ GAUSS_POINTS = 4  # products of the cubics of an element are of degree 6
 
 
 class PlacedLayout(NamedTuple):
-    """A layout with the begin and end of its k patches, `edges` (k, 2), m from the root of the link."""
+    """A layout with the begin and end of its k patches, `edges` (k, 2), m from the root."""
 
     layout: PztLayout
     edges: Array
@@ -195,10 +195,9 @@ def place_of(layout: PztLayout, sections: LinkSections, station: int) -> tuple[f
 
 
 def felt_loads(layout: PztLayout, sections: LinkSections, station: int) -> tuple[Array, Array]:
-    """Return C (4, 4) and f (4,), SI, of `layer_loads` for strains e_f that interact with patches; others d are free.
+    """Return C (4, 4) and f (4,), SI, of `layer_loads` for strains e_f that interact with patches; others, d, are free.
 
-    Link and layers together carry no load along these: e_d = (C_l + C)_dd⁻¹ (f_d V − C_df e_f) is eliminated, with 0 in
-    C and f.
+    Link and layers carry no load along d: e_d = (C_l + C)_dd⁻¹ (f_d V − C_df e_f) is eliminated, with 0 in C and f.
     """
     every, of_volt = layer_loads(layout, *place_of(layout, sections, station))
     felt = felt_rows(layout)
@@ -290,7 +289,7 @@ def _each(placed: Sequence[PlacedLayout]) -> tuple[list[PztLayout], Array]:
 
 
 def _straight(key: str, placed: PlacedLayout, body: ModalBody) -> Effects:
-    """On a link held straight: the loads of a volt times the differences of `potentials`, stretch by stretch."""
+    """Effects on a straight link: loads of a volt times differences of `potentials`, stretch by stretch."""
     layout, edges = placed
     own, sections = own_row(layout), link_sections(body)
     starts, ends, stations, first = _stretches(key, layout, body, sections, edges)
@@ -317,10 +316,7 @@ def _straight(key: str, placed: PlacedLayout, body: ModalBody) -> Effects:
 def _stretches(
     key: str, layout: PztLayout, body: ModalBody, sections: LinkSections, edges: Array
 ) -> tuple[Array, Array, Indices, Indices]:
-    """Stretches of one extent of k patches between `edges` (k, 2), patch by patch.
-
-    Starts and ends (m,), m, their stations (m,), and the first stretch (k,) of each patch.
-    """
+    """Stretches of one extent below k patches: starts and ends (m,), m, stations (m,), first stretch (k,) of each."""
     x, (starts, ends) = body.stations.position[:, 0], edges.T
     slack = np.minimum(1e-9 * body.length, 0.25 * (ends - starts))
     covered = (x[1:] > (starts + slack)[:, None]) & (x[:-1] < (ends - slack)[:, None])
@@ -351,10 +347,7 @@ def _stretches(
 
 
 def _outlined(key: str, layout: PztLayout, body: ModalBody, edges: Array) -> Array:
-    """Modal forces (k, n) of unit membrane force (N/m), pressing the upper face, pulling the lower; the mean of both.
-
-    On the layout's face; all that are outlined where it names none. Raises `InputError` where they are not outlined.
-    """
+    """Modal forces (k, n) of unit membrane force (N/m) on faces, outlined ones if none is named, else `InputError`."""
     patches = body.surface_patches
     if patches is None:
         raise InputError(

@@ -75,7 +75,7 @@ class LinkPatches:
         return self.bodies[self.body].Phi_V
 
     def voltages(self, F_p: Array) -> dict[str, Voltages]:
-        """Return the voltages by layout for modal forces F_p (T, n), N/√kg; `unmet` is that of all layouts together."""
+        """Return the voltages by layout for modal forces F_p (T, n), N/√kg, of which all layouts share `unmet`."""
         found = solve_voltages(self.reach, self.reach.modes.forces(F_p))
         return self._by_layout(found.required, found.within_limit, F_p)
 
@@ -116,7 +116,7 @@ class LinkPatches:
         return {name: self.reach.modes.forces(of.to_link.T).T for name, of in self.bodies.items()}
 
     def on_link(self, modal: Mapping[str, Array]) -> Array:
-        """Return modal forces (T, n), N/√kg, on modes of the link's file by forces `modal` on those of its `bodies`."""
+        """Return modal forces (T, n), N/√kg, on modes of the link's file by forces `modal` on its `bodies`."""
         found: Array = np.sum([modal[name] @ of.to_link.T for name, of in self.bodies.items() if name in modal], axis=0)
         return found
 
@@ -155,10 +155,9 @@ def driven_patches(placed: Iterable[PlacedLayout | PatchArray]) -> Array:
 
 
 def placed_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody) -> list[PlacedLayout]:
-    """Return layouts with the positions of their patches on the link, and with the key `strain`, which has a default.
+    """Return layouts with positions of patches, and the default of `strain`: none across wide links and outlined faces.
 
-    By default wide links and outlined faces prevent strain across a patch. `path` is that of the scene file. Raises
-    `InputError` for patches that do not fit the link.
+    Raises `InputError`, which begins with the scene's `path`, for patches that do not fit the link.
     """
     placed = []
     for layout in layouts:

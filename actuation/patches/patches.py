@@ -91,7 +91,7 @@ class Reach:
 
     @property
     def serves_all(self) -> bool:
-        """Whether voltages can produce all forces on the actuated modes."""
+        """Whether voltages can produce all forces on the served modes."""
         return self.Phi_V.shape[1] >= self.served and not self.unreached_modes.size
 
 
@@ -191,10 +191,7 @@ def voltage_scale(patches: Reach) -> Array:
 
 
 def voltage_gain(patches: Reach) -> Array:
-    """Voltages (k, n), V√kg/N, per modal force without limits: Φ_V⁻¹, or those of least weighted residual.
-
-    If many have it, they are the smallest relative to `voltage_scale`.
-    """
+    """Voltages (k, n), V√kg/N, per modal force without limits: Φ_V⁻¹, or of least weighted residual, and then least."""
     (n, k), served = patches.Phi_V.shape, patches.served
     if k == served and patches.serves_all:
         return np.linalg.inv(patches.Phi_V[:served]) @ np.eye(served, n)
@@ -226,7 +223,7 @@ class PatchArray(Reach):
         edges: (k, 2) where each patch begins and ends along the link, m.
         effects: effects on the modes of the `link`.
         turn: (n, k) rotation of the ends of each patch against each other by the n `modes`, rad/(m·√kg).
-        link: the modal body of the link that they are on.
+        link: modal body of the link.
     """
 
     layout: PztLayout

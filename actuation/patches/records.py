@@ -120,12 +120,6 @@ def fibre_lamina(
     """Lamina of parallel fibers at an `angle` (rad) from x, σ_s = 0: transformed compliances (Jones 1999, 2.6).
 
     Moduli in Pa, d33 along and d31 across the fibers in m/V; a volt is a field of 1/`spacing`, 1/m.
-
-        S̄_11 = S_11 c⁴ + (2 S_12 + S_66) s²c² + S_22 s⁴
-        S̄_16 = (2 S_11 − 2 S_12 − S_66) s c³ − (2 S_22 − 2 S_12 − S_66) s³c
-        S̄_66 = 2 (2 S_11 + 2 S_22 − 4 S_12 − S_66) s²c² + S_66 (s⁴ + c⁴)
-
-    C = [[S̄_11, S̄_16], [S̄_16, S̄_66]]⁻¹; free strains of a unit field ε_x = d33 c² + d31 s², γ_xs = 2 (d33 − d31) s c.
     """
     c, s = np.cos(angle), np.sin(angle)
     S_11, S_22, S_12, S_66 = 1 / E_1, 1 / E_2, -nu_12 / E_1, 1 / G_12

@@ -100,10 +100,7 @@ def link_sections(body: ModalBody) -> LinkSections:
 
 
 def check_sections(key: str, body: ModalBody, normal: Literal["y", "z"], *, twists: bool) -> None:
-    """Raise `InputError` where the modal body lacks the section data for patches on faces with that normal.
-
-    `twists`: the patches have fibers at an angle, which need the outline of the sections. `key` begins the message.
-    """
+    """Raise `InputError` where the modal body lacks the width of sections or, if patches twist it, their outline."""
     if np.isnan(link_sections(body).extent(normal)).any():
         raise InputError(
             f"{key}: expected a modal body file with the width of the link (stations/width)",
@@ -148,22 +145,22 @@ def side(layout: PztLayout) -> float:
 
 
 def bending_row(layout: PztLayout) -> int:
-    """Return the index of the strain e that is the curvature towards the patches' normal."""
+    """Return the index in e = (φ_z', u', φ_x', −φ_y') of the curvature towards the patches' normal."""
     return BEND_Y if layout.normal == "y" else BEND_Z
 
 
 def own_row(layout: PztLayout) -> int:
-    """Return the index of the strain e that the layout actuates."""
+    """Return the index in e = (φ_z', u', φ_x', −φ_y') of the strain that the layout actuates."""
     return TWIST if layout.bends == "twist" else bending_row(layout)
 
 
 def across_row(layout: PztLayout) -> int:
-    """Return the index of the curvature across the patches' width among the strains e."""
+    """Return the index in e = (φ_z', u', φ_x', −φ_y') of the curvature across the patches' width."""
     return BEND_Z if layout.normal == "y" else BEND_Y
 
 
 def felt_rows(layout: PztLayout) -> Indices:
-    """Return indices of the strains e (0 to 3) that interact with the patches: all on named faces, else their own."""
+    """Return indices (any,) in e = (φ_z', u', φ_x', −φ_y') of strains that interact with the patches."""
     if layout.face is None:
         return np.array([own_row(layout)])
     return np.flatnonzero([True, True, layout.lamina.shears, True])
@@ -182,10 +179,10 @@ def layer_section(layout: PztLayout, extent: float) -> tuple[float, float, float
 
 
 def layer_loads(layout: PztLayout, extent: float, lever: float) -> tuple[Array, Array]:
-    """Return C (4, 4) and f (4,) of the loads P = f V − C e of all layers on a section, N·m and N, by its strains e.
+    """Return C (4, 4), f (4,) of loads P = f V − C e, N·m and N, of the layers by strains e = (φ_z', u', φ_x', −φ_y').
 
     The link has `extent` t_b (m) along their normal; `lever` is β. Along the strain that they actuate, f of plain
-    ceramic on one face is E_p d31 w_p N (t_b + N t_p)/2 N·m/V: the layers' arms, t_b/2 + (i − ½) t_p, are summed (one:
+    ceramic on one face is E_p d31 w_p N (t_b + N t_p)/2 N·m/V, the sum of the layers' arms t_b/2 + (i − ½) t_p (one:
     Eq. 14 of Shabana 2022). Both faces double it; twist has the shear stress of a volt, times β, in place of E_p d31.
     """
     A, S, I = layer_section(layout, extent)  # noqa: E741
@@ -209,7 +206,7 @@ def layer_loads(layout: PztLayout, extent: float, lever: float) -> tuple[Array, 
 
 
 def straight_loads(layout: PztLayout, extent: float, lever: float) -> Array:
-    """Return f (4,), N·m/V and N/V, of `layer_loads`, 0 along strains that do not interact with the patches."""
+    """Return f (4,), N·m/V and N/V, of `layer_loads`, 0 along strains that do not interact with patches."""
     f = np.zeros(4)
     rows = felt_rows(layout)
     f[rows] = layer_loads(layout, extent, lever)[1][rows]
