@@ -4,8 +4,7 @@ A patch is a capacitor that its link stretches. By reciprocity its charge is q =
 of a volt, C is the capacitance of the patch on a link that stands still (Lee and Moon, J. Appl. Mech. 57, 1990).
 
 Of a voltage V over time the play operator of threshold r has z = max(V − r, min(V + r, z)), and a patch acts as under
-the voltage Σ w z (Prandtl and Ishlinskii). The inverse has the same form (Kuhnen, Eur. J. Control 9, 2003, eq. 20):
-with W_i = w_0 + … + w_i its weights are 1/W_i − 1/W_(i−1), its thresholds Σ_(j≤i) w_j (r_i − r_j).
+the voltage Σ w z (Prandtl and Ishlinskii). The inverse has the same form (Kuhnen, Eur. J. Control 9, 2003, eq. 20).
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ CHUNK = 1024  # voltages, all on one way up or down, whose play operators are fo
 
 @struct
 class Hysteresis:
-    """Hysteresis of k patches, which act as under the voltage Σ w z of play operators z."""
+    """Hysteresis of k patches, which act as under the effective voltage Σ w z of play operators z."""
 
     weights: Array  # (MOST_PLAYS, k) w, without unit; 0 of spare operators
     thresholds: Array  # (MOST_PLAYS, k) V, ascending from 0: z follows the voltage at this distance
@@ -37,7 +36,7 @@ class Hysteresis:
 
     @property
     def inverse(self) -> Hysteresis:
-        """Hysteresis from voltages, V, as which patches should act to those that they need, from rest on."""
+        """Hysteresis from wanted effective voltages, V, to the voltages that patches need, from rest on."""
         W = np.cumsum(self.weights, axis=0)
         weights = np.diff(1.0 / W, axis=0, prepend=0.0)
         return Hysteresis(weights, W * self.thresholds - np.cumsum(self.weights * self.thresholds, axis=0))
@@ -51,11 +50,11 @@ class Hysteresis:
         return np.clip(z, V - self.thresholds, V + self.thresholds)
 
     def acting(self, plays: Array) -> Array:
-        """Return the voltages (…, k), V, as under which patches act: Σ w z, with z = `plays` (…, MOST_PLAYS, k), V."""
+        """Return effective voltages Σ w z (…, k), V, for z = `plays` (…, MOST_PLAYS, k), V."""
         return (self.weights * plays).sum(axis=-2)
 
     def output(self, V: Array) -> Array:
-        """Return the voltages (T, k), V, as under which patches act at V (T, k), V, linear between, from rest."""
+        """Return effective voltages (T, k), V, of voltages V (T, k), V, linear between, from rest."""
         acting, z = np.empty_like(V), np.zeros_like(self.weights)
         turns = np.flatnonzero(np.diff(np.sign(np.diff(V, axis=0)), axis=0).any(axis=1)) + 2
         begins = np.union1d(turns, np.arange(0, len(V), CHUNK))
@@ -72,7 +71,7 @@ class Played:
         self._of, self._z = of, np.zeros_like(of.weights)
 
     def at(self, V: Array, last: Array | None = None) -> Array:
-        """Return the voltages (k,), V, as under which patches act at V (k,), V, on the way to the `last` (k,)."""
+        """Return effective voltages (k,), V, at V (k,), V, on the way to the `last` (k,)."""
         output = self._of.acting(self._of.plays(self._z, V))
         self._z = self._of.plays(self._z, V if last is None else last)
         return output
@@ -155,7 +154,7 @@ class Amplifiers:
         return kept, np.where(kept == after, mean, (now + kept) / 2)
 
     def output(self, times: Array, wanted: Array, strain: Array) -> Array:
-        """Return voltages (T, k), V, as under which patches act at `times` (T,), s, of `wanted` (T, k), linear between.
+        """Return effective voltages (T, k), V, at `times` (T,), s, of `wanted` (T, k), linear between.
 
         `strain` (T, k), A: current by the strain of the patches, Φ_Vᵀ ṗ.
         """

@@ -33,8 +33,8 @@ class Stiffening:
         K_s: (3, n, n) ∫ρ G_l dV, 1/m.
         K_x: (3, 3, n, n) ∫ρ x_k G_l dV at [k, l], without unit.
         K_points: (6, n, n) G of each interface along x, y, z, 1/(kg·m), and of its rotation about them, 1/(kg·m²).
-        S_turned: (3, 3, n, n) part of S̄_kl by the extent of payloads, which turn with their points, without unit. Only
-            equations with K_x have it, as `Body.S_bar_kl` lacks it.
+        S_turned: (3, 3, n, n) part of S̄_kl by the extent of payloads, without unit: `Body.S_bar_kl` lacks it, as only
+            equations with K_x have it.
     """
 
     K_s: Array
@@ -86,7 +86,7 @@ class Stiffening:
 def stiffening_of(body: ModalBody, *, is_planar: bool) -> Stiffening | None:
     """Return the geometric stiffness in a modal body; None if the file lacks what 3D or planar motion needs.
 
-    With K of its d'Alembert loads: K_s,i = −K(t_i), K_r,i = −K(r_i), K_ω,ii = K(omega_ii), K_ω,ij = ½ K(omega_ij).
+    It follows from K of d'Alembert loads (theory.md, Eq. 52).
     """
     inertial = unit_load_names(())
     if any(load not in body.geometric_stiffness for load in (IN_PLANE if is_planar else inertial)):
@@ -136,8 +136,7 @@ class BodyPoint:
 class Body(Invariants):
     """Constants of one body in the equations of motion, SI units (Shabana, Dynamics of Multibody Systems, ch. 5).
 
-    Arrays are over all n modes of the equations; `m_ff` is the identity. `S_bar_kl` is without S_spin, which files have
-    at [2, 2].
+    Arrays are over all n modes of the equations; `m_ff` = 1. `S_bar_kl` is without S_spin, which files have at [2, 2].
     """
 
     name: str  # of the body
@@ -255,7 +254,7 @@ def scaled(body: Body, *, mass: float = 1.0, stiffness: float = 1.0) -> Body:
 
 
 def from_modal_body(name: str, body: ModalBody, stiffened: bool = False, *, is_planar: bool = False) -> Body:
-    """Make a body with all modes of a modal body; `stiffened`: with geometric stiffness; `is_planar`: moving in z = 0.
+    """Make a body with all modes of a modal body; `stiffened`: with geometric stiffness; `is_planar`: in z = 0.
 
     Raises `InputError` where the file lacks the inertia of a beam about its own axis, or the geometric stiffness.
     """

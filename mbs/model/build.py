@@ -105,7 +105,7 @@ def _check_points(scene: MechanismScene, bodies: dict[str, Body]) -> None:
             )
 
 
-ALONG = 1e-12  # of the largest rotation of modes: what is left of them across an axis about which they all turn
+ALONG = 1e-12  # of the largest rotation of modes: round-off of those across an axis about which all turn
 
 
 def with_coordinates_of_frames(tree: KinematicTree) -> KinematicTree:

@@ -51,7 +51,7 @@ class PieceOfLink(NamedTuple):
 
 
 def divided_link_of(link: ModalBody, spatial: Body, pieces: Sequence[PieceOfLink]) -> DividedLink:
-    """Return the relation between a link and its pieces, in coordinates of their equations (`spatial` of the link)."""
+    """Return the relation of a link and its pieces in coordinates of their equations (`spatial`: the link's)."""
     of_file = [_shape_in_piece(link, piece.start, piece.modal) for piece in pieces]
     own = [np.linalg.pinv(piece.spatial.modal_transform) @ p for piece, p in zip(pieces, of_file, strict=True)]
     spread = np.vstack(own) @ spatial.modal_transform

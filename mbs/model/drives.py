@@ -25,8 +25,7 @@ class PointDrive(NamedTuple):
 class Command(NamedTuple):
     """Generalized forces `direction` (n_v,) of a unit command: 1 N·m, N or V.
 
-    For a motor that turns frames, not sections, `frame` has the number of the body that the joint carries, and the sign
-    of its torque there.
+    For a motor that turns frames, not sections, `frame` has the index of the body and the sign of the torque on it.
     """
 
     direction: Array
@@ -42,7 +41,7 @@ class Replayed(NamedTuple):
     at_points: Mapping[str, Mapping[str, int]] = MappingProxyType({})
     # by joint the indices of inputs along its coordinates, N·m or N on its second side
     moments: Mapping[str, Sequence[int]] = MappingProxyType({})
-    # time to find the inputs at one instant, in evaluations of the equations: longer if a motion is solved anew
+    # time to find inputs at one instant, in evaluations of the equations
     evaluations: float = 0.0
     breaks: Sequence[float] = ()  # (n,) s, at which inputs may jump
     integrator: str = ""  # of the earlier analysis, where this run repeats its motion; else empty

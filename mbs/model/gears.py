@@ -34,9 +34,9 @@ def elastic_joints(model: Model) -> list[Node]:
 def with_compliance(model: Model) -> Model:
     """Return the robot with the scene's compliant gears; motors and joint moments act on the motor side.
 
-    The output of such a gear is a body of the tree without inertia. It turns on the first side of the joint by θ_m, the
-    rotor N times as fast (M. W. Spong, J. Dyn. Syst. Meas. Control 109, 1987, with the rotor's whole angular velocity).
-    Coordinates of the outputs stand after all others.
+    The output of such a gear is a massless body of the tree. It turns on the first side of the joint by θ_m, the rotor
+    N times as fast (M. W. Spong, J. Dyn. Syst. Meas. Control 109, 1987, with the rotor's whole angular velocity).
+    Coordinates of outputs come last.
     """
     elastic = elastic_joints(model)
     if not elastic or model.tree.gears:

@@ -31,8 +31,7 @@ class CutPlace(NamedTuple):
 class ModelParts(NamedTuple):
     """Input of the core for a mechanism in space; SI units.
 
-    Forces act on the markers `wrenches`, and along the coordinates `cut` of joints at which loops are cut. `gravity`
-    (3,), m/s².
+    Forces act on the markers `wrenches`, and along coordinates `cut` of cut joints. `gravity` (3,), m/s².
     """
 
     bodies: list[_core.SpatialBody]
@@ -96,7 +95,7 @@ class Markers:
             body.joint = getattr(_core.JointKind, node.joint.type)
             body.lead = float(getattr(node.joint, "rise", 0.0))
             body.driven = driven is not None and bool(driven[node.v].any())
-            # Else the core may take the frame's coordinates where modes turn the section: same motion, other numbers.
+            # else the core may take coordinates of the frame, where modes turn the section
             body.of_section = moves(node)
             # A rotor sits on the first side and spins with N Ω_second − (N − 1) Ω_first; where that side is the outer
             # one, with N' Ω_outer − (N' − 1) Ω_inner and N' = 1 − N. In prismatic joints it spins with the coordinate.
@@ -131,10 +130,7 @@ def moves(node: Node) -> bool:
 
 
 def rows_of(body: Body, section: Section) -> tuple[Array, Array, list[Array]]:
-    """Return Φ over Φ_r (6, n), 1/√kg and 1/(√kg·m), position (3,), m, of a section; and its `Stiffening.K_points`.
-
-    These are six matrices (n, n), or none.
-    """
+    """Return Φ over Φ_r (6, n), 1/√kg, 1/(√kg·m), position (3,), m, and six or no `Stiffening.K_points` (n, n)."""
     if not section.point:
         return np.zeros((6, body.n_modes)), np.zeros(3), []
     at = body.points[section.point]
@@ -204,7 +200,7 @@ class Kinematics:
     def of_points(cls, nodes: Sequence[Node]) -> Kinematics:
         """Make the kinematics of frames and points of all bodies, and of sections at joints.
 
-        Outputs of rotors, which have no mass, have no sections in the core, but frames at the same places.
+        Massless outputs of rotors have frames in place of sections in the core.
         """
         still = [side for node in nodes for side in (node.inner, node.outer) if side.still and side.body >= 0]
         points = [
@@ -232,7 +228,7 @@ class Kinematics:
 
 
 class Places:
-    """Positions and velocities of frames and sections of a tree over T states."""
+    """Positions and velocities of frames and sections over T states."""
 
     def __init__(self, numbers: dict[tuple[object, ...], int], motions: Array) -> None:
         """`numbers` of sections in `motions` (T, frames and sections, 18)."""

@@ -26,7 +26,7 @@ class Wrench(NamedTuple):
         return Wrench(self.force, self.moment + np.cross(arm, self.force))
 
     def plus(self, other: Wrench, sign: float = 1.0) -> Wrench:
-        """Return the sum of both wrenches, or with sign −1 the difference."""
+        """Return the sum, or with sign −1 the difference."""
         return Wrench(self.force + sign * other.force, self.moment + sign * other.moment)
 
 
@@ -39,7 +39,7 @@ class State:
 
 
 class States(Protocol):
-    """States q (T, n_q), v and a (T, n_v) of a tree: m, rad, √kg·m and these per s and s²."""
+    """Protocol of states of a tree at T times."""
 
     @property
     def q(self) -> Array:
@@ -92,9 +92,9 @@ class MotionForces:
         return self.found.rotors[:, 3 * number : 3 * number + 3]
 
     def carried(self, q: Array) -> list[Wrench]:
-        """Return reactions, N and N·m, of joints about their outer sides, at q (T, n_q), without forces that do work.
+        """Return reactions, N and N·m, of joints about their outer sides, at q (T, n_q).
 
-        Torques of motors, loads and friction along joint coordinates do work, and are left out.
+        Forces that do work are left out: of motors, loads and friction along joint coordinates.
         """
         numbers = range(len(self.system.model.tree.nodes))
         of_joints = np.hstack([part for number in numbers for part in self.of_joint(number)])
@@ -144,10 +144,7 @@ def multiplier_forces(system: MultibodySystem, q: Array, times: Array, multiplie
 
 
 def rotor_torques(model: Model, states: States, times: Array) -> Array:
-    """Return inertia times angular acceleration (T, bodies), N·m, of the rotor in each body's inboard joint; else 0.
-
-    In prismatic joints it is J N γ̈ of the coordinate alone. `times` (T,), s.
-    """
+    """Return J u̇ (T, bodies), N·m, of the rotor in each body's inboard joint, u its speed, else 0; `times` (T,), s."""
     tree, system = model.tree, MultibodySystem(model)
     forces = motion_forces(system, states, times, np.zeros((len(times), len(model.rows))))
     places, torque = tree.places(states.q), np.zeros((len(times), len(tree.nodes)))
@@ -168,7 +165,7 @@ def required_forces(model: Model, state: States, times: Array) -> Array:
 
 
 def row_accelerations(system: MultibodySystem, state: States, times: Array) -> Array:
-    """Return accelerations C̈ (T, rows), m/s² or rad/s², of constraints against their targets at `times` (T,), s."""
+    """Return C̈ (T, rows), m/s² or rad/s², of constraints against their targets at `times` (T,), s."""
     of_core = system.core.row_accelerations(system.scene, times.tolist(), state.q, state.v, state.a)
     return of_core * system.model.row_signs
 

@@ -82,9 +82,8 @@ def _uncoupled(body: Body, m_ff: Array, added: Array | None = None) -> Body:
 def uncoupling(M: Array, K: Array) -> tuple[Array, Array]:
     """Return T (n, n) with TᵀMT = 1 and TᵀKT = diag(stiffness), and this stiffness (n,), rad²/s², of n modes.
 
-    Modes that M (n, n), without unit, and K (n, n), rad²/s², do not couple are not mixed, so that they keep their
-    families: those of a round link in two planes, with equal frequencies, stay apart. Coupled ones are in ascending
-    order in the places that they had.
+    Modes that M (n, n), without unit, and K (n, n), rad²/s², do not couple are not mixed, even at equal frequencies, so
+    that they keep their families. Coupled ones are in ascending order in the places that they had.
     """
     T, stiffness = np.zeros_like(M), np.zeros(len(M))
     for block in coupled_blocks(M, K):
@@ -96,7 +95,7 @@ def uncoupling(M: Array, K: Array) -> tuple[Array, Array]:
 
 
 def coupled_blocks(*matrices: Array) -> list[Indices]:
-    """Return sets of indices of modes (any,) that any of the `matrices` (n, n), of any unit, couples."""
+    """Return sets of indices (any,) of modes that any of the `matrices` (n, n), of any unit, couples."""
     coupled = np.eye(len(matrices[0]), dtype=bool)
     for matrix in matrices:
         scale = np.sqrt(np.diag(matrix))

@@ -44,9 +44,9 @@ class Constraints(Kinematics):
         return [row.owner for row in turning], Kinematics(self.nodes, rows=turning)
 
     def natural_gradients(self, q: Array, times: Array, sizes: Array | None = None) -> Array:
-        """Return C_v (T, rows, n_v), without unit, so that its rank has none either, at q (T, n_q) and `times` (T,), s.
+        """Return C_v (T, rows, n_v), without unit, at q (T, n_q) and `times` (T,), s, to find its rank.
 
-        Equations are relative to their natural sizes, coordinates to `sizes` (n_v,), by default those of joints.
+        Equations are relative to natural sizes, coordinates to `sizes` (n_v,), by default those of joints.
         """
         sizes = self._joint_sizes if sizes is None else sizes
         return self.values(q, times)[1] * sizes / self._row_sizes[:, None]
@@ -54,7 +54,7 @@ class Constraints(Kinematics):
     def turned_over(self, q: Array, times: Array) -> dict[str, Booleans]:
         """Return by name (T,) whether a loop joint or tool axis is turned by π at q (T, n_q) and `times` (T,), s.
 
-        Its "dot" equations are 0 there, too: they do not determine in which sense axes are parallel.
+        "dot" equations, which do not distinguish senses of parallel axes, are 0 there, too.
         """
         owners, senses = self._senses
         if not owners:
@@ -70,8 +70,7 @@ class Constraints(Kinematics):
     def postures(self, q: Array, times: Array, locked: Booleans | None = None) -> tuple[Array, Booleans]:
         """Project q (T, n_q), SI, onto C(q, t) = 0 at `times` (T,), s; return it and flags (T,) of convergence.
 
-        Joints not `locked` (n_v,) move by least steps. A solution with a joint or tool axis turned by π does not count
-        as converged.
+        Joints not `locked` (n_v,) move by least steps. A joint or tool axis turned by π does not count as converged.
         """
         moved, left = self.moved(q, times, locked=locked)
         is_met = left <= MET
@@ -179,10 +178,7 @@ class Model:
         return replace(self, rows=tuple(row for row in self.rows if not row.is_trajectory))
 
     def modal_directions(self, on_modes: Mapping[str, Array]) -> Array:
-        """Return generalized forces (k, n_v) of k forces (n, k), N/√kg, on the modes of files by body.
-
-        Gradients of functions of modal coordinates, too, become gradients along v.
-        """
+        """Return generalized forces (k, n_v) of k forces (n, k), N/√kg, on the modes of files by body; or gradients."""
         (count,) = {forces.shape[1] for forces in on_modes.values()}
         directions = np.zeros((count, self.tree.n_v))
         for node in self.tree.nodes:

@@ -80,8 +80,8 @@ class ConstraintRow:
     kind: ConstraintKind
     a: Section
     b: Section
-    f: Array
-    g: Array
+    f: Array  # (3,)
+    g: Array  # (3,)
     is_trajectory: bool = True
     # index in v; "turn" and "slide" subtract this coordinate, if it is not −1
     coordinate: int = -1
@@ -96,7 +96,7 @@ def rows_of_joint(
 ) -> list[ConstraintRow]:
     """Return the equations by which coordinates of a node's joint, `sign` · v[`columns`] (k,), follow k `targets`.
 
-    For planar joints they are between sections, with `sign` 1, as the core prescribes no coordinates whose axes turn.
+    For planar joints, whose axes turn, they are between sections, with `sign` 1.
     """
     if node.joint.type != "planar":
         row = ConstraintRow(owner, "coordinate", node.inner, node.outer, np.zeros(3), np.zeros(3), sign=sign)

@@ -1,13 +1,12 @@
 """Bodies of planar scenes, projected on the plane z = 0 of their frames; mechanisms that move in a plane.
 
-Displacements of modes across the plane keep their share of m_ff = 1. Masses matter in the plane by affine displacements
-that keep shapes alone: translations along x and y, an expansion (x, y) and a rotation (−y, x). A body gets the
-integrals of a mass that is as wide along x as along y about its center, which has no others: then geometric stiffening,
-which is by affine fields, is the same in 3D.
+Displacements of modes across the plane keep their share of m_ff = 1. Masses have affine displacements that keep shapes
+alone: translations along x and y, an expansion (x, y) and a rotation (−y, x). A body gets the integrals of a mass that
+is as wide along x as along y about its center, which has no others: then geometric stiffening is the same in 3D.
 
 Mechanisms whose joints all turn about the normal of a plane or slide in it, and whose bodies bend in it, are solved in
 the plane, with the same q, v and forces along them. Offsets, forces and loop equations across it do no work. Reactions
-(`quantities/reactions.py`) follow from the motion, with masses and forces in space.
+(`quantities/reactions.py`) follow from the motion in space.
 """
 
 from collections.abc import Iterator, Sequence
@@ -28,7 +27,7 @@ PLANE, TURN = np.diag(ALONG), np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0,
 
 
 def projected(body: Body) -> Body:
-    """Return a body without motion across the plane z = 0 of its frame, and without modes that move only across it."""
+    """Return a body without motion across the plane z = 0 of its frame, and without modes that move only so."""
     moving = np.flatnonzero(np.einsum("kknn->n", body.S_bar_kl[:2, :2]) > IMMOBILE)
     kept = transformed(body, np.eye(body.n_modes)[:, moving], body.stiffness[moving])
     center = kept.first_moment * ALONG / kept.mass
@@ -87,8 +86,8 @@ def _keeping_shapes(I: Array) -> Array:  # noqa: E741
     return np.multiply.outer(PLANE, stretch) + np.multiply.outer(TURN, turn)
 
 
-EXACT = 1e-12  # of unit vectors, and of shapes relative to the largest: what round-off leaves of axes that are the same
-UPRIGHT = 0.437  # of the normal along z of a triad: below it z is nearer to the plane (an angle that nobody draws)
+EXACT = 1e-12  # round-off of unit vectors, and of shapes relative to the largest
+UPRIGHT = 0.437  # of the normal along z of a triad: below it z is nearer to the plane
 
 
 class AcrossError(Exception):
@@ -96,7 +95,7 @@ class AcrossError(Exception):
 
 
 def axes_across(normal: Array) -> Array:
-    """Return axes (3, 3), rows x, y and the normal; x is the axis x if the normal is perpendicular to it."""
+    """Return axes (3, 3), rows x, y and the `normal` (3,); x is kept if the normal is perpendicular to it."""
     x = np.eye(3)[0 if abs(normal[0]) < 0.9 else 1]
     x = x - normal * (normal @ x)
     x /= np.linalg.norm(x)
@@ -104,10 +103,9 @@ def axes_across(normal: Array) -> Array:
 
 
 def axes_of_triad(normal: Array) -> Array:
-    """Return axes (3, 3) of a planar marker, rows x, y and the normal, in axes of its triad in space.
+    """Return axes (3, 3) of a planar marker, rows x, y and the `normal` (3,), in axes of its triad in space.
 
-    Triads of revolute and planar joints have z along the normal and keep x and y. Prismatic joints slide along z, which
-    becomes x.
+    Triads of revolute and planar joints have z along the normal; z of prismatic ones, along which they slide, is x.
     """
     if abs(normal[2]) >= UPRIGHT:
         return axes_across(normal)

@@ -1,7 +1,4 @@
-"""The equations of motion of a scene under its constraints, as the core's recursion evaluates them. SI units.
-
-Also the split of generalized forces: motor torques and modal forces in place of the forces on a path.
-"""
+"""The equations of motion under constraints in the core, and the split of forces to motors and modes. SI units."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
@@ -34,8 +31,7 @@ class Integrated(NamedTuple):
 class MultibodySystem:
     """A tree with its constraint equations (rows) in the core; states (q, v) are those of the tree. SI units.
 
-    In the core equations of joint coordinates have those of the tree, `ConstraintRow.sign` times the scene's: targets
-    and multipliers are `sign` times those of `Model.rows`.
+    In the core coordinates, targets and multipliers of reversed joints are `ConstraintRow.sign` times the scene's.
 
     Attributes:
         model: the model from which it is made.
@@ -91,7 +87,7 @@ class MultibodySystem:
     def plane(self) -> Plane | None:
         """The plane that contains all motion, with the same q and v; None without one.
 
-        Forces that depend on the motion of points exclude it, except in planar scenes, as they may leave the plane.
+        Forces that depend on the motion of points may lead out of it, except in planar scenes.
         """
         if not all(function.is_planar for _, function in self._of_motion):
             return None
@@ -218,13 +214,10 @@ def zero_order_hold(model: Model, commands: Sequence[Command]) -> _core.ZeroOrde
 
 @struct
 class MotorForces:
-    """Motor forces τ (T, k) by joint, N·m or N, on its second side; modal forces F_p (T, n), N/√kg, of patches by body.
+    """Motor torques and modal forces of patches."""
 
-    F_p are on the modes of the modal body file.
-    """
-
-    moments: Mapping[str, Array]
-    modal: Mapping[str, Array]
+    moments: Mapping[str, Array]  # τ (T, k), N·m or N, by joint, on its second side
+    modal: Mapping[str, Array]  # F_p (T, n), N/√kg, by body, on the modes of its file
 
 
 def driven_system(model: Model) -> MultibodySystem:
@@ -252,7 +245,7 @@ def fastest_mechanism(model: Model, *, has_motors: bool = True) -> _core.PlanarD
 def integrated_mechanism(
     system: MultibodySystem, *, has_motors: bool = True
 ) -> _core.PlanarDriven | _core.SpatialDriven:
-    """Return the mechanism that integrators use: planar if all motion is in one plane."""
+    """Return the mechanism for integrators: planar if all motion is in one plane."""
     (core, scene, rows), model = system.integrated, system.model
     is_path = [model.rows[k].is_trajectory for k in rows]
     driven: _core.PlanarDriven | _core.SpatialDriven
@@ -278,10 +271,7 @@ def path_forces(model: Model, times: Array, q: Array, multipliers: Array) -> Arr
 
 
 def frames_in_core(model: Model, q: Array) -> list[tuple[Array, Array]]:
-    """Return axes (3, 3) and origin (3,), m, of each body's frame in the core's frame of this body, at q (n_q,).
-
-    The core's frames are where they suit the joints.
-    """
+    """Return axes (3, 3) and origin (3,), m, of each body's frame in the core's frame of this body, at q (n_q,)."""
     places, frames = model.tree.places(q[None]), driven_system(model).core.frames(q, np.zeros(model.tree.n_v))
     own = [places.frame(number) for number in range(len(frames))]
     return [(of.R.T @ at.F[0], of.R.T @ (at.r[0] - of.r)) for of, at in zip(frames, own, strict=True)]
@@ -333,8 +323,7 @@ class FrameShare(NamedTuple):
 def frame_share(model: Model, joint: str, q: Array) -> FrameShare:
     """Return modal forces −Φ_rᵀ J_l(φ) z per torque of a revolute joint's motor on both sections at q (n_q,).
 
-    z is the axis, φ = Φ_r p the rotation of a section and J_l the left Jacobian of rotation vectors; see
-    core/recursion/motion/zero_order_hold.h.
+    z is the axis, φ = Φ_r p, J_l the left Jacobian; see core/recursion/motion/zero_order_hold.h.
     """
     tree = model.tree
     direction, slope = np.zeros(tree.n_v), np.zeros((tree.n_v, tree.n_v))

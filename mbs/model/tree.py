@@ -1,11 +1,11 @@
 """A tree of bodies, and the joints at which its loops are cut.
 
-State q has, for each body in the order of the tree, the q of its joint, then its p; v likewise, with the joint's v.
-It is that of the core. All functions evaluate states (…, n_q) at once; results are in global axes, SI units.
+State q has, for each body in the order of the tree, the q of its joint, then its p; v likewise; so in the core. All
+functions evaluate states (…, n_q) at once; results are in global axes, SI units.
 
 The tree has no coordinate γ of a joint at which a loop is cut, γ̇ = G v: a force f along it, as of friction or a load,
-is Gᵀf. The output of a rotor is a body of the tree without inertia beside the loop: its coordinate is γ by a constraint
-equation, and all that acts along the joint acts there.
+is Gᵀf. The output of a rotor there is a massless body of the tree with the coordinate γ, by a constraint equation: all
+that acts along the joint acts on it.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ AXES.setflags(write=False)
 
 
 class CompliantGear(NamedTuple):
-    """A compliant gear: `spring`, and damper `damping` c (N·m·s/rad or N·s/m), behind a motor of the tree.
+    """A compliant gear: `spring` and `damping` (N·m·s/rad or N·s/m) behind a motor of the tree.
 
     Its twist is δ = θ_m − γ with the coordinate θ_m of `motor`, and `sign` γ of `joint`.
     """
@@ -112,10 +112,7 @@ class KinematicTree:
         self.carried = {node.joint.name: number for number, node in enumerate(nodes)}
 
     def section(self, side: str, triad: Array = AXES, at: Sequence[float] = (0.0, 0.0, 0.0)) -> Section:
-        """Return the section "BODY.POINT", the frame of "BODY", or a place `at` (3,), m, on "ground".
-
-        `triad` (3, 3), columns, is in axes of the body or tool.
-        """
+        """Return section "BODY.POINT", frame of "BODY", or "ground" `at` (3,), m, with a `triad` (3, 3), columns."""
         if side == GROUND:
             return Section(-1, "", triad, np.array(at, dtype=float))
         body, _, point = side.partition(".")
@@ -128,9 +125,9 @@ class KinematicTree:
         return self.section(*first, joint.at), self.section(*second, joint.at)
 
     def with_outputs(self, outputs: Sequence[tuple[JointRecord, str, Section]]) -> KinematicTree:
-        """Return the tree with the output of a rotor's gear as a massless body for each (joint, name, section).
+        """Return the tree with the output of a rotor's gear for each (joint, name, section).
 
-        It turns or slides on this section as the joint of one coordinate does. Outputs come after all other bodies.
+        It is a massless body that turns or slides on this section as the joint does. Outputs come after all bodies.
         """
         tree, nodes = copy.copy(self), list(self.nodes)
         for joint, label, inner in outputs:
@@ -215,10 +212,7 @@ class CutCoordinate(NamedTuple):
 
 
 def with_auxiliary_rotors(tree: KinematicTree) -> tuple[KinematicTree, list[ConstraintRow]]:
-    """Return the tree with outputs of the rotors in cut joints, and the equations by which they move with these joints.
-
-    Outputs are on the first sides of their joints, with the same coordinates.
-    """
+    """Return the tree with outputs of rotors on first sides of cut joints, and equations: they move as the joints."""
     cut = [joint for joint in tree.loops if getattr(joint, "rotor_inertia", 0.0)]
     rows = [cut_row(tree, joint) for joint in cut]
     longer = tree.with_outputs([(joint, f"{joint.name}/rotor", row.a) for joint, row in zip(cut, rows, strict=True)])
