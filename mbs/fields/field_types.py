@@ -35,9 +35,8 @@ METHOD = "integrator"
 class Steps:
     """Steps of an analysis in the results file at `path`: `method`, and times (N,), s, at which steps ended.
 
-    With the same steps the discrete motion is a smooth function of every number in the scene, and differences of runs
-    have no noise but round-off: internal numerical differentiation (H. G. Bock, Springer Series in Chemical Physics
-    18, 1981, p. 102).
+    With the same steps the motion is a smooth function of every number in the scene, and differences of runs have no
+    noise but round-off (H. G. Bock, Springer Series in Chemical Physics 18, 1981, p. 102).
     """
 
     path: Path

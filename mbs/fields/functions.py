@@ -63,8 +63,8 @@ def _name_of(function: object) -> str:
 def check_domain(function: TimeFunction, times: Array, describe: str, derivatives: int = 2) -> None:
     """Raise `InputError` unless `function` and its first `derivatives` time derivatives exist at all `times` (T,), s.
 
-    The message starts with `describe` (file and key) and has the first time where one is missing or infinite: a domain
-    error, an overflow, or a time that the waypoints do not cover.
+    The message starts with `describe` (file and key) and has the first time of a domain error, an overflow, or that
+    the waypoints do not cover.
     """
     samples = function.sample(np.ascontiguousarray(times, dtype=np.float64))[: derivatives + 1]
     bad = np.flatnonzero(~np.isfinite(samples).all(axis=0))
@@ -95,9 +95,9 @@ GOLDEN = 0.6180339887498949  # its multiples fall on no grid, so on no instant a
 def check_derivatives(function: TimeFunction, end: float, describe: str) -> None:
     """Raise `InputError`, starting with `describe`, where rate or acceleration contradict differences before `end` (s).
 
-    Differences of the value, and of the rate, are made with several steps h, and count where those with h/2 agree.
-    Few or none do beside a jump of the acceleration, where values are rounded, or vibrate faster than a step. The
-    function is wrong where all that count contradict it.
+    Differences of value and rate with several steps h count where those with h/2 agree: few or none do beside a jump
+    of the acceleration, or where values are rounded, or vibrate. The function is wrong where all that count
+    contradict it.
     """
     times = end * (0.02 + 0.96 * ((GOLDEN * np.arange(1, INSTANTS + 1)) % 1.0))
     given = function.sample(times)

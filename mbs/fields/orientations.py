@@ -44,8 +44,8 @@ class OrientationLaw:
 def orientation_of(table: Waypoints) -> tuple[Array, Reference]:
     """Return rotation vectors (T, 3), rad, of columns qw, qx, qy, qz from their mean orientation, and that of the mean.
 
-    Splines of log(A A_refᵀ) are smooth; piecewise interpolation of quaternions would jump in angular velocity. Raises
-    `InputError` for a row that is no unit quaternion, and for orientations too far apart for one rotation vector.
+    Splines of these vectors are smooth; interpolated quaternions would jump in angular velocity. Raises `InputError`
+    for a row that is no unit quaternion, and for orientations too far apart for one rotation vector.
     """
     columns = [table.columns.index(name) for name in QUATERNION]
     e = table.values[:, columns]

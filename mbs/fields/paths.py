@@ -108,7 +108,7 @@ def superposed(motions: Sequence[Piecewise], weights: Sequence[float] | None = N
 
 
 def merged(instants: Array) -> Array:
-    """Return `instants` (any,), s, in ascending order; those that differ by round-off are one."""
+    """Return `instants` (any,), s, ascending; those that differ by round-off are one."""
     every = np.unique(instants)
     return every[np.append(True, np.diff(every) > SAME_TIME * np.ptp(every))]
 
@@ -200,7 +200,7 @@ def averaged_step(times: Array) -> Piecewise:
 def polynomial_law(smoothness: int) -> Piecewise:
     """Return s(t) ∝ ∫ t^m (1 − t)^m dt on [0, 1], m = `smoothness`: as many derivatives vanish at both ends.
 
-    It has two pieces, as the large coefficients of one would make round-off at its end.
+    It has two pieces against the round-off of large coefficients at its end.
     """
     whole = _polynomial(smoothness)[:, None]
     return Piecewise(np.array([0.0, 0.5, 1.0]), np.array([whole, shifted(whole, 0.5)]))
@@ -235,8 +235,7 @@ class Legs:
     limits: PathLimits  # of the speed along the path and its derivatives
     durations: tuple[float, ...] | None  # (k,) s of each leg; None: the shortest within the limits
     holds: tuple[float, ...]  # (k − 1,) s, rests at the places between
-    # share of the shorter of two legs for which they overlap where there is no hold: the path then passes the place
-    # between them within the triangle of the three, without a stop
+    # overlap of legs without hold, as a share of the shorter one: the path passes within the triangle of three places
     blend: float = 0.0
     stretch: float = 1.0  # factor of the times of all legs, not of holds
 
@@ -296,9 +295,8 @@ def impulses(kind: Kind, frequency: float, damping_ratio: float) -> list[Impulse
     """Return the impulses of a shaper for vibrations of one undamped `frequency`, Hz.
 
     "zv" leaves no vibration of that frequency (Singer and Seering 1990, J. Dyn. Syst. Meas. Control 112); "zvd" none,
-    and little nearby (the derivative with respect to frequency is zero, too); "ei" 5 %, and at most 5 % over a wider
-    range (Singhose, Seering and Singer 1994, J. Mech. Des. 116). Shares fall with K = exp(−ζπ/√(1 − ζ²)), by which half
-    a period damps a vibration.
+    with zero derivative by frequency; "ei" at most 5 % over a wider range (Singhose, Seering and Singer 1994, J. Mech.
+    Des. 116). Shares fall with K = exp(−ζπ/√(1 − ζ²)), by which half a period damps a vibration.
     """
     damped = sqrt(1.0 - damping_ratio**2)
     half, K, V = 0.5 / (frequency * damped), exp(-damping_ratio * pi / damped), RESIDUAL

@@ -39,7 +39,7 @@ def _reader(spelling: Any) -> TypeAdapter[Any]:
 
 @dataclass(frozen=True)
 class Spelled:
-    """Annotation of a field that planar scenes write as type `spelling`; function `in_3d` converts its values to 3D."""
+    """Annotation of a field that planar scenes write as type `spelling`; `in_3d` converts values to 3D."""
 
     spelling: Any
     in_3d: Callable[[Any], Any] | None = None
@@ -95,7 +95,7 @@ def place(x_y: Sequence[float]) -> tuple[float, float, float]:
 
 
 def inertia_about_z(J: float) -> tuple[float, float, float]:
-    """Return moments of inertia about x, y, z (kg·m²) of a body with J about z; x and y do not matter in the plane."""
+    """Return moments about x, y, z (kg·m²) of a body with J about z; x and y do not matter in the plane."""
     return ACROSS * J, ACROSS * J, J
 
 

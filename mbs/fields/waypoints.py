@@ -72,8 +72,7 @@ class Waypoints:
     def spline(self) -> Piecewise:
         """Quintic spline (four continuous derivatives) through the rows, from rest to rest.
 
-        Successive rows with the same values are a hold, at which one spline ends and another begins. Velocity and
-        acceleration are zero at holds and at both ends.
+        Successive rows with the same values are a hold. Velocity and acceleration are zero there and at both ends.
         """
         begins, ends = self._ways
         if not len(begins):
@@ -92,9 +91,9 @@ class Waypoints:
 
     @property
     def abrupt_hold(self) -> str:
-        """Remark on a hold that the rows do not approach smoothly, as they turn there or have too few digits; else "".
+        """Remark on a hold that rows do not approach smoothly, as they turn or have too few digits; else "".
 
-        Accelerations of the spline in the two intervals before and after it are compared with those of the rows.
+        Accelerations of the spline in the two intervals before and after are compared with those of the rows.
         """
         begins, ends = self._ways
         if len(self.times) < MANY or len(begins) < 2 or (ends - begins).max() < SAMPLES:

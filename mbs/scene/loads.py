@@ -16,7 +16,7 @@ OF_POINT = ("x", "y", "z", "mx", "my", "mz")
 class Load(Referring):
     """A prescribed load: force (N) and moment (N·m) on a section in global axes, joint torque, or voltages (V).
 
-    `force` on a point, in scenes made in Python: a function of its motion, see `state_forces.state_function`.
+    `force` on a point, in scenes made in Python: a function of its motion, see `functions.state_function`.
     """
 
     point: PointReference | None = None
@@ -26,17 +26,17 @@ class Load(Referring):
     pzt: str | None = None
     """Name of the layout with the driven patches (default: the name of the body)."""
     x: Expression | None = None
-    """Force along the ground's x axis, N; expression in t."""
+    """Force along global x, N; expression in t."""
     y: Expression | None = None
-    """Force along the ground's y axis, N; expression in t."""
+    """Force along global y, N; expression in t."""
     z: Annotated[Expression | None, IN_SPACE] = None
-    """Force along the ground's z axis, N; expression in t."""
+    """Force along global z, N; expression in t."""
     mx: Annotated[Expression | None, IN_SPACE] = None
-    """Moment about the ground's x axis on the section, N·m; expression in t."""
+    """Moment about global x on the section, N·m; expression in t."""
     my: Annotated[Expression | None, IN_SPACE] = None
-    """Moment about the ground's y axis on the section, N·m; expression in t."""
+    """Moment about global y on the section, N·m; expression in t."""
     mz: Annotated[Expression | None, IN_SPACE] = None
-    """Moment about the ground's z axis on the section, N·m; expression in t."""
+    """Moment about global z on the section, N·m; expression in t."""
     moment: Annotated[Expressions | None, Spelled(Expression)] = None
     """Torque on the second side of the joint (of a compliant gear: on its output, before the spring) along its
     coordinate, N·m (N along sliding coordinates); expression in t, or a list of them for several coordinates. In planar

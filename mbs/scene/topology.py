@@ -16,7 +16,7 @@ class Edge(NamedTuple):
 
 
 class Carrier(NamedTuple):
-    """Joint that carries a body: its index, its side on the body (`own`) and the `other` side."""
+    """Joint that carries a body: its index, its side on the body (`own`), the `other` side."""
 
     joint: int
     own: str

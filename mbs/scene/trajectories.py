@@ -133,11 +133,11 @@ class Trajectory(Referring):
     """Joint whose motor follows the trajectory; a compliant gear (`stiffness`) lets the joint coordinate differ from
     that of the motor."""
     x: Expression | None = None
-    """Position along the ground's x axis, m; expression in t (s)."""
+    """Position along global x, m; expression in t (s)."""
     y: Expression | None = None
-    """Position along the ground's y axis, m; expression in t (s)."""
+    """Position along global y, m; expression in t (s)."""
     z: Annotated[Expression | None, IN_SPACE] = None
-    """Position along the ground's z axis, m; expression in t (s)."""
+    """Position along global z, m; expression in t (s)."""
     rotation_vector: Annotated[Triple | None, IN_SPACE] = None
     """Orientation of the section: axis times angle, rad, global axes; expressions in t."""
     reference_rotation_vector: Annotated[Vector3 | None, IN_SPACE] = None
