@@ -2,7 +2,7 @@
 
 Deflections within a piece are 1/N² of those within the link. Pieces are simply supported, with one eigenmode (in
 space one of each plane of bending) and the static shapes of what their neighbors do to them: a frame between the ends
-of a piece turns with it, and leaves small deflections and few steps (docs/theory.md, Links in pieces).
+of a piece turns with it, and leaves small deflections and few steps (docs/theory.md, Subdivided links).
 """
 
 from collections.abc import Mapping, Sequence

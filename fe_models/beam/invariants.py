@@ -88,7 +88,7 @@ POINTS = 5  # Gauss points of an element: exact, since of cubics no product is o
 
 
 def geometric_stiffness(link: BeamLink, stations: Functions, fields: Array, interfaces: dict[str, float]) -> Array:
-    """Return geometric stiffness (l, n, n) of the unit loads (`unit_loads`), under the link's reference condition.
+    """Geometric stiffness (l, n, n), rad²/s² per unit of load, of the `unit_loads` under the reference condition.
 
     `fields` (6, k, n) are rows U_X … R_Z at k stations; every interface, at its m from the root, is a vertex of their
     mesh. Euler–Bernoulli links are a line of mass: their spin inertia has no second-order motion.

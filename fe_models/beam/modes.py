@@ -104,8 +104,8 @@ def lowest_modes(
 
     Assembly rounds K's large entries, of order EI/h³; against the lowest ω² these errors grow as elements⁴. The
     Rayleigh quotient of the strains, which are differences of x once and not twice over (elements²), gives ω² without
-    them, and tells where a mesh is too fine for double precision. `flexibility`: by default K⁻¹; for fixed interfaces,
-    that with these. Raises `SolveError` where round-off errors spoil the modes.
+    them, and tells where a mesh is too fine for double precision. `flexibility`: K⁻¹, or that with fixed interfaces.
+    Raises `SolveError` where round-off errors spoil the modes.
     """
     K, M, strain = model.K, model.M, model.strain
     try:

@@ -126,7 +126,7 @@ class Modes(Record):
     family: Annotated[tuple[Family, ...], Field(min_length=1)] | Family | Literal["all"] = "all"
     """Family or families of the eigenmodes."""
     attachment_modes: bool = True
-    """Addition of what eigenmodes lack of static shapes of loads at interfaces, and of torques along a bent link."""
+    """Addition of static shapes of loads at interfaces, and of torques along a bent link, to the eigenmodes."""
     solver: Solver = "slepc"
     """Solver of the eigenproblem: SLEPc's Krylov–Schur or, of solids, block Lanczos, faster for fine meshes."""
 

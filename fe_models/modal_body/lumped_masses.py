@@ -112,7 +112,7 @@ def loads_with_lumps(names: Sequence[str], attached: Iterable[Lump]) -> Array:
 
 
 def with_lumped_stiffness(matrices: Array, names: Sequence[str], attached: Sequence[Lump]) -> dict[str, Array]:
-    """Geometric stiffness (n, n) by unit load, N or N·m, with that of lumps: inertia loads, points that turn.
+    """Geometric stiffness (n, n), rad²/s² per unit of load, by unit load, with lumps: their inertia and turning.
 
     `matrices` (l, n, n) are those of the bare link.
     """

@@ -22,8 +22,8 @@ class Integrals:
         mass: m in kg.
         first_moment: (3,) ∫ρ x dV in kg·m.
         second_moment: (3, 3) ∫ρ x xᵀ dV in kg·m².
-        S_bar: (3, n) ∫ρ Φ dV.
-        I_bar: (3, 3, n) ∫ρ x_k Φ_l dV at [k, l].
+        S_bar: (3, n) ∫ρ Φ dV in √kg.
+        I_bar: (3, 3, n) ∫ρ x_k Φ_l dV at [k, l] in m·√kg.
         S_bar_kl: (3, 3, n, n) ∫ρ Φ_kᵀ Φ_l dV at [k, l].
     """
 
@@ -92,7 +92,7 @@ class Interface(Frozen):
 
     @property
     def motion(self) -> Array:
-        """Translation, then rotation (6, n)."""
+        """Translation, m, then rotation, rad (6, n), per unit of modal coordinate."""
         return np.concatenate([self.translation, self.rotation])
 
 
@@ -136,7 +136,7 @@ class PictureMesh(Frozen):
     Attributes:
         points: (p, 3) in m.
         cells: (c, v) points of each cell.
-        mode_shapes: (p, 3, n) displacement per unit of modal coordinate.
+        mode_shapes: (p, 3, n) displacement in m per unit of modal coordinate.
         edges: (e, 2) points of the edges of finite elements, where `cells` divide these for a smooth picture.
     """
 

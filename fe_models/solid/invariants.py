@@ -45,11 +45,10 @@ def shape_integrals(model: SolidModel, modes: Array) -> Invariants:
 
 
 def unit_loads(model: SolidModel, interfaces: Mapping[str, Array]) -> Array:
-    """Return consistent nodal forces (3 owned, l) of the unit loads (docs/theory.md, Geometric stiffness); collective.
+    """Return consistent nodal forces (3 owned, l), N per unit, of the l unit loads of a link; collective.
 
-    D'Alembert forces −ρ(a + α × x + ω × (ω × x)) of unit a, α and products of ω (of xy, the terms of ω_x ω_y and ω_y
-    ω_x together), and unit forces and moments at interfaces, which the transpose of their mean motion B (6, 3 owned)
-    spreads.
+    They are d'Alembert forces, and forces and moments at `interfaces`, spread by the transpose of their mean motion B
+    (6, 3 owned): see `modal_body.unit_loads`.
     """
     wrenches = inertia_wrenches(model.x, np.ones(len(model.x)), np.zeros_like(model.x))
     return np.hstack([model.mass @ wrenches[:, :3].reshape(-1, MOTIONS), *(B.T for B in interfaces.values())])
@@ -72,7 +71,7 @@ def prestressed(
     interfaces: Mapping[str, Interface],
     supports: Mapping[str, Sequence[int]],
 ) -> Array:
-    """Return geometric stiffness (l, n, n) of `modes` (3 owned, n) by unit load; collective.
+    """Geometric stiffness (l, n, n), rad²/s² per unit of load, of `modes` (3 owned, n) by unit load; collective.
 
     It belongs to centers and rotation vectors of the interfaces. `loads` and `shapes` (3 owned, l) are nodal forces,
     N, and displacements, m, of the unit loads, `rows` B (6, 3 owned) the mean motion of each interface, whose transpose

@@ -231,7 +231,7 @@ class Gradients:
 
     @cached_property
     def strains(self) -> Array:
-        """Strains (c, 6, q, k) ε_xx, ε_yy, ε_zz, 2ε_yz, 2ε_xz, 2ε_xy."""
+        """Strains (c, 6, q, k), dimensionless: ε_xx, ε_yy, ε_zz, 2ε_yz, 2ε_xz, 2ε_xy."""
         return _symmetric(self.values)
 
     def stresses(self, model: SolidModel) -> Array:
@@ -298,7 +298,7 @@ def internal_forces(model: SolidModel, fields: Array) -> Array:
 
 
 def geometric_stiffness(model: SolidModel, modes: Array, prestress: Array) -> Array:
-    """Return (l, n, n) ∫ σ_ab ∂_aΦ_i · ∂_bΦ_j dV for the stresses σ of each of l displacement fields; collective.
+    """Return ∫ σ_ab ∂_aΦ_i · ∂_bΦ_j dV (l, n, n), J, for the stresses σ of each of l displacement fields; collective.
 
     Second variation of the work of a stress σ on the quadratic part of Green's strain (Bathe, Finite Element
     Procedures, §6.2.3): positive where tension stiffens. `modes` (3 owned, n) are Φ, `prestress` (3 owned, l) the
