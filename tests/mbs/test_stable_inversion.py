@@ -89,7 +89,7 @@ def test_zeros_of_joint_motion_are_the_frequencies_with_the_joint_locked():
 
 
 def test_internal_dynamics_are_those_of_the_constrained_and_driven_rows():
-    """M of r is Lᵀ M Z along the tree: Z keeps C_s, L the motors' coordinates (docs/theory.md, Motors alone)."""
+    """M of r is Lᵀ M Z along the tree: Z keeps C_s, L the motors' coordinates (theory.md, Torque-only tracking)."""
     model = arm()
     servo, dynamics = at_rest(model)
     p = equilibrium(servo, 0.0)[None]

@@ -4,7 +4,7 @@
     python exudyn_large_deflection.py pendulum 1e9 --elements 32 --step 2e-4 -o tip.csv
 
 writes time and position of a point (tip of the second link, tip of the coupler) and prints the seconds that the solver
-took. docs/theory.md, Links in pieces, compares. Needs no ffrobot.
+took. docs/theory.md, Subdivided links, compares. Needs no ffrobot.
 """
 
 import argparse
