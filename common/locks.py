@@ -17,7 +17,7 @@ ASK_EVERY = 0.02  # s
 
 @contextmanager
 def held(path: Path, patience: float) -> Iterator[bool]:
-    """Context that locks the file `path`; yields False after `patience` s in vain, or where there are no locks.
+    """Context that locks the file `path`; yields False after `patience` s in vain, or where no locks exist.
 
     The kernel ends the lock with this process, however that ends. It saves work that another process does at the same
     time: results have to be right without it.

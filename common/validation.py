@@ -48,7 +48,7 @@ def space_of(info: ValidationInfo) -> str | None:
 
 
 def as_tuples(value: Any) -> Any:
-    """Turn lists in `value` into tuples, for pydantic validators that run before those of a type."""
+    """Turn lists in `value` into tuples, for validators that run before pydantic checks the type."""
     if isinstance(value, dict):
         return {key: as_tuples(item) for key, item in value.items()}
     return tuple(as_tuples(item) for item in value) if isinstance(value, list | tuple) else value

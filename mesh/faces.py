@@ -87,7 +87,7 @@ class SmoothFace:
 
     @classmethod
     def of(cls, boundary: PartBoundary, facets: Integers) -> SmoothFace:
-        """Make a face of `facets` (k,), their numbers on the `boundary`."""
+        """Make a face of the facets with the numbers `facets` (k,) on the `boundary`."""
         weights = boundary.area[facets] / boundary.area[facets].sum()
         normals = boundary.normal[facets]
         normal = weights @ normals

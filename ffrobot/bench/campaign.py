@@ -94,7 +94,7 @@ class Campaign:
         self.machine = _about_machine()
 
     def scene(self, path: Path, analysis_name: str | None, folder: Path, parts: Sequence[str]) -> Swept | None:
-        """Measure the `parts` "work-precision" and "axes" of a scene; returns reference and points of the former."""
+        """Measure the `parts` "work-precision" and "axes" of a scene; returns reference and points of the first."""
         scene = load_scene(path)
         analysis = find_analysis(scene, analysis_name)
         swept = self.work_precision(scene, analysis.name, folder) if "work-precision" in parts else None

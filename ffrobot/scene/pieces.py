@@ -1,6 +1,6 @@
 """Scenes with links in pieces: the same scene with a body for each piece, welded to the next.
 
-What computes motions gets the scene of pieces; what is said of them is of the one link (`ffrobot.run.pieces`).
+Motions are computed in the scene of pieces; results are of the whole link (`ffrobot.run.pieces`).
 """
 
 from __future__ import annotations

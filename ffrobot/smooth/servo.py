@@ -163,7 +163,7 @@ class Servo:
         return max(axis.delay + _decay(axis.poles) for axis in self.axes)
 
     def motors(self, times: Array, command: Array) -> Piecewise:
-        """Return paths of n motors from rest, under set points (T, n), rad or m, at `times` (T,), s, and `settled` on.
+        """Return paths of n motors from rest, under set points (T, n), rad or m, at `times` (T,), s, until `settled`.
 
         Each line of the command is exact: a change of its slope by Δ adds Δ (t − Σρ + Σρ e^(λt)), with the residues ρ
         of G/s² at the poles λ of G.

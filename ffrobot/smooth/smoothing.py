@@ -63,7 +63,7 @@ class Smoothed:
 
     @property
     def own(self) -> Candidate:
-        """The motion as it is, as one of the `candidates`."""
+        """The motion as it is, to compare with `candidates`."""
         of, ride = self.before.recording, self.before.ride
         shares = (np.vstack([self.before.peaks, ride.torque]) / self.limits.sizes).max(axis=1)
         return Candidate(
@@ -131,7 +131,7 @@ def smooth_motion(
     kind: str = "",
     watcher: Watcher | None = None,
 ) -> Smoothed:
-    """Find out why a robot vibrates on a recorded or planned motion, and one that leaves less: `ffrobot smooth`.
+    """Find why a robot vibrates on a recorded or planned motion, and a motion that leaves less: `ffrobot smooth`.
 
     Args:
         scene: a scene file; its analyses are not needed.

@@ -117,7 +117,7 @@ def perform(run: SweepRun) -> Row | None:
 
 
 def finished_row(folder: Path) -> Row | None:
-    """Return the row that a completed earlier run wrote to `folder`; None if there is none."""
+    """Return the row that an earlier run, of any status, left in `folder`; None if there is none."""
     with suppress(OSError, ValueError, TypeError, KeyError, RecursionError):
         data = json.loads((folder / ROW).read_text(encoding="utf-8"))
         return Row(**(data | {key: tuple(data.get(key, ())) for key in ("values", "imported", "wanted")}))
