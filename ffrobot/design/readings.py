@@ -141,7 +141,7 @@ class History:
 
 
 def read_history(results: Results, name: str, option: str) -> History:
-    """Return the history `name`; without an analysis in front, that of the first analysis that has it.
+    """Return the history `name`; without an analysis in front, that of the first analysis of the results.
 
     Raises `InputError`, which begins with `option`, where there is none.
     """

@@ -156,7 +156,7 @@ class PoseModel:
         self._rest: Array | None = None  # the first equilibrium
 
     def at(self, robot: Solution) -> Array:
-        """Return the `stacked` equations (3 f + r, f) of a prepared robot about its equilibrium in the pose, SI units.
+        """Return the `stacked` equations (3 f + r, f) of a robot about its equilibrium in the pose, SI units.
 
         Raises `InputError` for unknown points, `SolveError` without an equilibrium.
         """

@@ -1,4 +1,4 @@
-"""A map from its plan to its file: postures first, then their judgment in parallel, part by part, resumable."""
+"""A map from its plan to its file: postures, then quantities in parallel, part by part, resumable."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ class MapPlan:
 
     @property
     def turned_about(self) -> Array | None:
-        """Unit vector (3,) about which the tool turns over the grid."""
+        """Unit vector (3,), axes of the tool, else global ones, of turns of the tool over the grid; None without turns."""
         if self.milling is None or TURN not in [axis.name for axis in self.axes]:
             return None
         return np.array(self.milling.axis) / np.linalg.norm(self.milling.axis)
@@ -185,7 +185,7 @@ def default_point(scene: Scene) -> str:
 def make_map(plan: MapPlan, batch: Batch, watcher: Watcher) -> PoseMap:
     """Compute all poses of the grid; parts from an earlier run of the same plan are read from the folder.
 
-    Raises `InputError` without motors, and for an unknown point; `SolveError` if no pose is possible.
+    Raises `InputError` without motors, and for unknown points or axes; `SolveError` if no pose is possible.
     """
     solution = prepare_scene(plan.scene, watcher)
     if not solution.model.motors:

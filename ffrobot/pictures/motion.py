@@ -168,7 +168,7 @@ def visible_exaggeration(size: float, deflection: float) -> float:
 
 @struct
 class PointTarget:
-    """Prescribed positions of a point at T outputs: `wanted` (T, columns), m, global axes; `columns` of x, y, z."""
+    """Prescribed positions of a point at T outputs: `wanted` (T, c), m, of the global axes number `columns` (c)."""
 
     trajectory: str
     point: str

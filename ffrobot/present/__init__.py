@@ -1,1 +1,1 @@
-"""What the command line prints: summaries, tables, progress, logs."""
+"""Output of the command line: summaries, tables, progress, logs."""

@@ -91,7 +91,7 @@ class Display(Watcher):
         os.write(sys.stderr.fileno(), b"ffrobot: stopping, and keeping what was computed (again: not keeping it)\n")
 
     def advance(self, t: float, end: float) -> bool:
-        """Update the bar to time `t` of `end`, s, or print a line now and then; True: the run continues."""
+        """Update the bar to `t` of `end` (s, or a count), or print a line now and then; True: the run continues."""
         if self._progress is not None and self._task is not None:
             self._progress.update(self._task, completed=t, total=end)
         elif self._progress is None:

@@ -1,4 +1,4 @@
-"""What a solve prints with `--verbose`: everything that its summary leaves out."""
+"""Output of a solve with `--verbose`: all that its summary omits."""
 
 from collections.abc import Iterator, Mapping, Sequence
 

@@ -96,7 +96,7 @@ def error_budget(solution: Solution) -> Iterator[str]:
 
 
 def integrated(solution: Solution) -> list[AnalysisResult]:
-    """Return the analyses that integrated equations of motion over time."""
+    """Return results of the analyses that integrate over time."""
     return [result for result in solution.analyses.values() if result.analysis.is_integrated]
 
 

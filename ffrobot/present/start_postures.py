@@ -1,4 +1,4 @@
-"""Output of `ffrobot pose`: the posture in which a scene starts, and other possible ones."""
+"""Output of `ffrobot pose`: the posture at the start of a scene, and other possible ones."""
 
 from __future__ import annotations
 

@@ -172,7 +172,7 @@ def file_name(*parts: str) -> str:
 
 
 def curve_points(results: Results, curve: Curve, scale: float) -> tuple[Array, Array]:
-    """Return abscissa (T,), time (s) or the curve's `x`, and values (T, columns) times `scale`, in stored units."""
+    """Return abscissa (T,), time (s) or the curve's `x`, and values (T, columns): `scale` times those in the file."""
     values = results.data(curve.data)
     if curve.magnitude:
         values = np.linalg.norm(values, axis=1)[:, None]

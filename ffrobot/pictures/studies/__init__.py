@@ -1,1 +1,1 @@
-"""What sensitivities, searches and uncertainties have found, as pictures: their data, figures, and files."""
+"""Pictures of results of sensitivities, searches and uncertainties: their data, figures, and files."""

@@ -1,7 +1,7 @@
 """From a modal body file or a results file to a folder with grids for ParaView and pictures by PyVista.
 
 Grids are VTK's unstructured ones in HDF5, written without VTK (docs.vtk.org, "VTKHDF format specification", version
-2.0; ParaView 5.12): cells once, points and their data once for each time step.
+2.0; ParaView 5.12): cells once, points and data at each time step.
 """
 
 import pickle
