@@ -117,7 +117,7 @@ class Evaluations:
 
 
 def write_designs(tried: Evaluations, path: Path) -> None:
-    """Write a CSV line for each design of a search: values of keys and responses, largest excess of a limit, folder."""
+    """Write a CSV line for each design of a search: values of keys and responses, excess of limits, folder."""
     problem = tried.problem
     responses = [problem.objective.text, *(limit.text for limit in problem.limits)]
     columns = ["design", *map(".".join, tried.space.keys), "status", *responses, "violation", "folder", "message"]

@@ -217,7 +217,7 @@ class VariedKeys:
 
     Attributes:
         names: the texts.
-        start: (n,) values of their first keys in the file.
+        start: (n,) values of their first keys in the file, in their units.
     """
 
     def __init__(
@@ -236,13 +236,13 @@ class VariedKeys:
         self.start = np.array([self._starts[group[0]] for group in self._groups])
 
     def changes(self, values: Array) -> dict[Key, float]:
-        """Return the values of all keys from those (n,) of the parameters."""
+        """Return the values of all keys from those (n,) of their first ones, in their units."""
         pairs = zip(self._groups, values / self.start, strict=True)
         return {key: float(self._starts[key] * c) for group, c in pairs for key in group}
 
     @contextmanager
     def named(self, values: Array) -> Iterator[None]:
-        """Context that adds the values (n,) of the parameters to errors of a model with them."""
+        """Context that adds the values (n,) of the first keys, in their units, to errors of a model with them."""
         try:
             yield
         except FfrobotError as error:
@@ -260,7 +260,7 @@ class VariedKeys:
             check_new_file(new, replace=replace)
 
     def write(self, values: Array) -> tuple[str, ...]:
-        """Write files with the values (n,) of the parameters, to 8 digits, and return their paths."""
+        """Write files by values (n,) of the first keys, in their units, to 8 digits; return their paths."""
         fitted = {key: float(f"{value:.8g}") for key, value in self.changes(values).items()}
         texts = self.target.files(fitted, self._place)
         for new, text in texts.items():

@@ -1,6 +1,6 @@
 """Measured frequency response functions (FRFs) of a robot in poses, in SI units and global axes.
 
-The TOML file of tests, and the files that it names: universal files (dataset 58), CSV tables and .mat files.
+Sources: a TOML file of tests, universal files (dataset 58), CSV tables, .mat files.
 """
 
 import io

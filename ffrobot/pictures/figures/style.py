@@ -74,7 +74,7 @@ def new_axes(title: str) -> tuple[Figure, Axes]:
 def line_style(k: int, points: int, *, alone: bool = False) -> dict[str, Any]:
     """Return the style of the k-th curve, of `points`: sparse markers and dashes distinguish equal curves.
 
-    A curve that is `alone` has none: on a vibration they look like samples.
+    A curve that is `alone` has none, as they look like samples.
     """
     if alone and points > 1:
         return {"color": COLORS[k % len(COLORS)]}

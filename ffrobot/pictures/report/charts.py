@@ -127,7 +127,7 @@ def plain(text: str) -> str:
 
 
 def encoded(values: NDArray[Any], kind: str = "f4") -> dict[str, str]:
-    """Return values (n,) or (n, m) as Plotly's typed array: base64 of little-endian numbers; "f4" keeps 7 digits."""
+    """Return values (n,) or (n, m), any unit, as Plotly's typed array: little-endian, base64; "f4" has 7 digits."""
     array = np.ascontiguousarray(values, dtype=f"<{kind}")
     entry = {"dtype": kind, "bdata": b64encode(array.tobytes()).decode("ascii")}
     if array.ndim == 2:
