@@ -17,9 +17,10 @@ RowMajor allocate(Allocation &allocation, const RowMajor &F_p) {
 } // namespace
 
 void bind_allocation(nb::module_ &m) {
-  nb::class_<Allocation>(m, "Allocation", "Voltages within limits by bounded weighted least squares.")
+  nb::class_<Allocation>(m, "Allocation", "Voltages of k patches within limits by bounded weighted least squares.")
       .def(nb::init<MatrixXd, const MatrixXd &, MatrixXd, VectorXd, VectorXd, VectorXd>(), "Phi"_a, "W_sqrt"_a,
            "gain"_a, "lower"_a, "upper"_a, "scale"_a)
-      .def("solve", &allocate, "F_p"_a, "Voltages (T, k) for modal forces (T, n); each solve starts at the one before.")
+      .def("solve", &allocate, "F_p"_a,
+           "Voltages (T, k), V, for modal forces (T, n), N/sqrt(kg); each solve starts at the one before.")
       .def_prop_ro("iterations", &Allocation::iterations);
 }

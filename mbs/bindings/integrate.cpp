@@ -33,22 +33,22 @@ void bind_kinds(nb::module_ &m) {
 
 void bind_integrate(nb::module_ &m) {
   bind_kinds(m);
-  nb::class_<IntegrationControls>(m, "IntegrationControls", "What an integration is made with; max_steps 0: no limit.")
-      .def("__init__", &make_controls, nb::kw_only(), "tolerance"_a, "max_steps"_a, "methods"_a, "spectral_radius"_a,
-           "methods: one, or two of which the faster is found out, each with the cost of a step and the pace that is\n"
-           "expected of it, in s of the run per cost.")
+  nb::class_<IntegrationControls>(m, "IntegrationControls", "Methods and limits of an integration; max_steps 0: none.")
+      .def(
+          "__init__", &make_controls, nb::kw_only(), "tolerance"_a, "max_steps"_a, "methods"_a, "spectral_radius"_a,
+          "methods: (kind, cost of a step, expected pace in s of the run per cost) of one, or of two of which the run\n"
+          "takes the faster.")
       .def_rw("keep_steps", &IntegrationControls::keep_steps,
-              "Whether ends of steps are reported, if they can be repeated.")
+              "Whether ends of steps are kept, if they can be repeated.")
       .def_rw("stops", &IntegrationControls::stops, "Times (s), ascending, at which steps end, too.")
       .def_rw("repeated_steps", &IntegrationControls::repeated_steps,
-              "Ends (s) of the steps to take, with the first method and whatever their error; none: as the tolerance\n"
-              "wants them.");
+              "Ends (s) of the steps to take, with the first method and any error; empty: by the tolerance.");
   auto samples = nb::class_<Samples>(m, "Samples",
                                      "States within a run, closer than its outputs: mbs/core/integrate/integrate.h.");
   samples
       .def(nb::init<double, std::size_t, int>(), "longest"_a, "most"_a, "parts"_a = 1,
-           "longest: s between two of them, where steps are longer; most: of them; parts: of each step, at least.")
-      .def_ro("every", &Samples::every, "Of so many steps one is among them.")
+           "longest: s between two samples; most: number of samples; parts: of each step, at least.")
+      .def_ro("every", &Samples::every, "Ends of every so many steps are samples.")
       .def_prop_ro("times", [](const Samples &s) { return as_vector(s.times); })
       .def_prop_ro(
           "states", [](const Samples &s) { return as_vector(s.states); }, "(q, v) of each, one after the other.");

@@ -127,7 +127,7 @@ template <class Space> void bind_model(nb::class_<Model<Space>> model) {
               first.emplace_back(node.q, node.p_q(), node.v, node.p_v());
             return first;
           },
-          "Of each body: index in q of its joint and of its modes, index in v of both.")
+          "By body: index in q of its joint and of its modes, index in v of both.")
       .def("evaluate", &evaluate<Space>, "q"_a, "v"_a, "target"_a, "force"_a.none(), "wrench"_a.none(),
            "(a, lambda): accelerations (n_v) and multipliers (rows).")
       .def(
@@ -136,11 +136,11 @@ template <class Space> void bind_model(nb::class_<Model<Space>> model) {
             model.check_state(q, v);
             return keep_independent_constraints(q.data(), v.data(), model.w);
           },
-          "q"_a, "v"_a, "Indices of rows that do not depend on others at a state; the rest is left out from now on.")
-      .def("measure", &constraint_values_of<Space>, "q"_a, "v"_a, "Values and rates of rows.")
+          "q"_a, "v"_a, "Numbers of constraint equations that are independent at a state; only these are kept.")
+      .def("measure", &constraint_values_of<Space>, "q"_a, "v"_a, "Values and rates of constraint equations.")
       .def("derivatives", &derivatives_at<Space>, "scene"_a, "t"_a, "q"_a, "v"_a, "supplied"_a,
-           "At a state at time t, under a scene and forces supplied beside (n_v), exact; springs of joints and gears "
-           "are\nleft as they are, and rows that depend on others are left out.");
+           "Exact, at a state at time t (s), under a scene and further forces `supplied` (n_v), without springs of "
+           "joints\nand gears, and without constraint equations that depend on others.");
 }
 
 template <class Space> void bind_rest(nb::class_<Model<Space>> model) {
@@ -165,8 +165,8 @@ template <class Space> void bind_rest(nb::class_<Model<Space>> model) {
             return stiffness_at_rest(scene, t, q, multipliers, independent, model.w);
           },
           "scene"_a, "t"_a, "q"_a, "multipliers"_a, "independent"_a,
-          "(n_v, n_v) derivative of C_q^T multipliers - Q by increments of q, exact; multipliers of rows that are not\n"
-          "among the `independent` ones are 0.");
+          "(n_v, n_v) exact derivative of C_q^T multipliers - Q by increments of q; multipliers of equations that are\n"
+          "not among the `independent` ones are 0.");
 }
 
 template <class Space> void bind_kinematics(nb::class_<Model<Space>> model) {
@@ -209,7 +209,8 @@ template <class Space> void bind_postures(nb::class_<Model<Space>> model) {
             return Postures<Space>(scene, model.w).constraints(times, q);
           },
           "scene"_a, "times"_a, "q"_a,
-          "Values of rows less targets (T, rows), less full turns, and C_v (T, rows n_v) at times (T) and q (T, n_q).")
+          "Values of constraint equations less targets (T, rows), less full turns, and C_v (T, rows n_v) at times (T) "
+          "and q (T, n_q).")
       .def(
           "constraint_rates",
           [](Model<Space> &model, const Scene &scene, const std::vector<double> &times, const RowMajor &q,
@@ -217,7 +218,7 @@ template <class Space> void bind_postures(nb::class_<Model<Space>> model) {
             check_postures(model, scene, times, q), check_states(model, q, v);
             return Postures<Space>(scene, model.w).rates(times, q, v);
           },
-          "scene"_a, "times"_a, "q"_a, "v"_a, "Rates of rows less those of targets (T, rows).")
+          "scene"_a, "times"_a, "q"_a, "v"_a, "Rates of constraint equations less those of targets (T, rows).")
       .def(
           "postures",
           [](Model<Space> &model, const Scene &scene, const std::vector<double> &times, const RowMajor &q,
@@ -229,10 +230,10 @@ template <class Space> void bind_postures(nb::class_<Model<Space>> model) {
             return Postures<Space>(scene, model.w).solve(times, q, beside, {scales, sizes, largest_step});
           },
           "scene"_a, "times"_a, "q"_a, "beside"_a, "scales"_a, "sizes"_a, "largest_step"_a,
-          "q (T, n_q) moved onto the rows at times (T), and what is left (T) in natural sizes: see "
+          "q (T, n_q) moved onto the constraint equations at times (T), and their residual (T) in natural sizes: see "
           "mbs/core/recursion/motion/postures.h.")
       .def("mobilities", &mobilities_of<Space>, "scene"_a, "times"_a, "q"_a, "is_path"_a, "length"_a, "loop_rank"_a,
-           "How joints can move with rigid links at times (T) and q (T, n_q); loop_rank -1: what loops have there.");
+           "Mobility with rigid links at times (T) and q (T, n_q); loop_rank -1: that of the loops there.");
 }
 
 // At states that are known
@@ -246,18 +247,17 @@ template <class Space> void bind_forces(nb::class_<Model<Space>> model) {
             return without_work(q, forces, model.w);
           },
           "q"_a, "forces"_a,
-          "(T, dim bodies) what of forces with moments on outer sections of joints does no work along coordinates.")
+          "(T, dim bodies) the part of forces with moments on outer sections of joints that does no work along them.")
       .def("required_forces", &required_forces<Space>, "scene"_a, "times"_a, "q"_a, "v"_a, "a"_a,
            "M a - Q (T, n_v) along v at states q (T, n_q), v and a (T, n_v): what gravity, elasticity, damping and the "
            "forces of the scene leave for others.")
       .def("row_accelerations", &constraint_accelerations<Space>, "scene"_a, "times"_a, "q"_a, "v"_a, "a"_a,
-           "Second derivatives of the values of rows (T, rows), less those of their targets.")
-      .def(
-          "motion_forces", &motion_forces<Space>, "scene"_a, "times"_a, "q"_a, "v"_a, "a"_a, "multipliers"_a,
-          "What bodies and joints do to each other at states q (T, n_q), v and a (T, n_v), under multipliers (T, rows) "
-          "and the forces of the scene.")
+           "Second derivatives of constraint equations (T, rows), less those of their targets.")
+      .def("motion_forces", &motion_forces<Space>, "scene"_a, "times"_a, "q"_a, "v"_a, "a"_a, "multipliers"_a,
+           "Forces between bodies and in joints at states q (T, n_q), v and a (T, n_v), under multipliers (T, rows) "
+           "and the forces of the scene.")
       .def("multiplier_forces", &multiplier_forces<Space>, "scene"_a, "times"_a, "q"_a, "multipliers"_a,
-           "The same of multipliers (T, rows) by themselves: what they do to joints and constraints.")
+           "Forces in joints and constraints by multipliers (T, rows) alone.")
       .def_prop_ro(
           "sections", [](const Model<Space> &model) { return ForcesOfStates<Space>::sections(model.mechanism); },
           "Body and marker of each section of MotionForces.")
@@ -286,26 +286,27 @@ template <class Space> void bind_all(nb::class_<Model<Space>> model) {
 void bind_recursion(nb::module_ &m) {
   bind_tree_data(m);
   bind_state_function(m);
-  nb::class_<Derivatives>(m, "Derivatives", "Of accelerations a and rows, by increments of q, by v and by forces f.")
+  nb::class_<Derivatives>(m, "Derivatives",
+                          "Of accelerations a and constraints, by increments of q, by v and forces f.")
       .def_ro("a_q", &Derivatives::a_q)
       .def_ro("a_v", &Derivatives::a_v)
       .def_ro("a_f", &Derivatives::a_f)
       .def_ro("value_q", &Derivatives::value_q)
       .def_ro("rate_q", &Derivatives::rate_q);
-  nb::class_<ForcesAtRest>(m, "ForcesAtRest", "What acts at rest, and what constraint equations measure.")
+  nb::class_<ForcesAtRest>(m, "ForcesAtRest", "Forces and constraint equations at rest.")
       .def_ro("Q", &ForcesAtRest::Q, "(n_v) of gravity, elasticity and the scene.")
-      .def_ro("value", &ForcesAtRest::value, "(rows) less their targets.")
-      .def_ro("C_q", &ForcesAtRest::C_q, "(rows, n_v)")
-      .def_ro("force", &ForcesAtRest::force, "N, the largest that a joint transmits, or a load.")
-      .def_ro("moment", &ForcesAtRest::moment, "N m, the same.");
+      .def_ro("value", &ForcesAtRest::value, "(rows) of constraint equations, less targets.")
+      .def_ro("C_q", &ForcesAtRest::C_q, "(rows, n_v) gradients of these.")
+      .def_ro("force", &ForcesAtRest::force, "N, the largest in a joint, or of a load.")
+      .def_ro("moment", &ForcesAtRest::moment, "N m, the largest in a joint, or of a load.");
   nb::class_<Mobility>(m, "Mobility", "Of rigid links; see mbs/core/recursion/motion/mobility.h.")
       .def_ro("loop_rank", &Mobility::loop_rank)
-      .def_ro("free", &Mobility::free, "(joint coordinates, freedoms)")
+      .def_ro("free", &Mobility::free, "(joint coordinates, freedoms) orthonormal motions that loops allow.")
       .def_prop_ro("ratio", &Mobility::ratio)
       .def_prop_ro("loop_ratio", &Mobility::loop_ratio)
       .def_prop_ro("followed", &Mobility::followed)
-      .def_prop_ro("left", &Mobility::left, "(joint coordinates, m)")
-      .def_prop_ro("hardest", &Mobility::hardest, "(joint coordinates)");
+      .def_prop_ro("left", &Mobility::left, "(joint coordinates, m) motions with the path prescribed.")
+      .def_prop_ro("hardest", &Mobility::hardest, "(joint coordinates) motion that the path follows least.");
   bind_body<Planar>(m, "PlanarBody"), bind_body<Spatial>(m, "SpatialBody");
   bind_all(nb::class_<Model<Planar>>(m, "PlanarModel", "A mechanism in the plane, in joint coordinates."));
   bind_all(nb::class_<Model<Spatial>>(m, "SpatialModel", "A mechanism in space, in joint coordinates."));

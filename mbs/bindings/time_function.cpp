@@ -79,7 +79,7 @@ void bind_time_function(nb::module_ &m) {
       .def_static("compiled", &compiled_function, "address"_a,
                   "Address of a C function void(double t, double *value_rate_acceleration).")
       .def("held", &TimeFunction::held, "begin"_a, "end"_a,
-           "The same between `begin` and `end`, and at rest with its values there outside.")
+           "The function between `begin` and `end` (s), constant before and after.")
       .def(
           "__call__",
           [](const TimeFunction &function, double t) {

@@ -15,9 +15,9 @@ void bind_constraints(nb::module_ &m) {
       .def(nb::init<int, int>(), "body"_a, "marker"_a)
       .def_ro("body", &MarkerAt::body)
       .def_ro("marker", &MarkerAt::marker)
-      .def_rw("only_forces", &MarkerAt::only_forces, "Of a wrench in the plane: its moment is zero at all times.");
-  bind_fields(nb::class_<ConstraintModel>(m, "ConstraintModel",
-                                          "A constraint row between markers a and b; see mbs/core/recursion/model.h."));
+      .def_rw("only_forces", &MarkerAt::only_forces, "Whether the moment of a wrench in the plane is always zero.");
+  bind_fields(nb::class_<ConstraintModel>(
+      m, "ConstraintModel", "A constraint equation between markers a and b: mbs/core/recursion/model.h."));
 }
 
 void bind_motions_and_forces(nb::module_ &m) {
@@ -28,15 +28,15 @@ void bind_motions_and_forces(nb::module_ &m) {
       .def_ro("R", &FrameMotion::R);
   nb::class_<MotionForces>(
       m, "MotionForces",
-      "What bodies and joints do to each other, over states (T, …): forces with their moments "
-      "about the sections on which they act, global axes; mbs/core/recursion/inverse/motion_forces.h.")
+      "Forces between bodies and in joints over states (T, …), N, with moments about the sections on which they act, "
+      "N m, global axes; mbs/core/recursion/inverse/motion_forces.h.")
       .def_ro("bodies", &MotionForces::bodies, "(T, 9 bodies) acceleration, angular acceleration, angular velocity.")
       .def_ro("points", &MotionForces::points, "(T, 9 wrenches) the same of sections on which wrenches may act.")
-      .def_ro("sections", &MotionForces::sections, "(T, dim sections) all that acts on each of the model's sections.")
-      .def_ro("joints", &MotionForces::joints, "(T, dim bodies) what the joint of each does to its outer section.")
+      .def_ro("sections", &MotionForces::sections, "(T, dim sections) sum on each of the model's sections.")
+      .def_ro("joints", &MotionForces::joints, "(T, dim bodies) of the joint of each body on its outer section.")
       .def_ro("constraints", &MotionForces::constraints, "(T, 2 dim rows) on section a, then on section b of each.")
       .def_ro("wrenches", &MotionForces::wrenches, "(T, dim wrenches) given forces, and those along cut joints.")
-      .def_ro("modal", &MotionForces::modal, "(T, n_v) what modes take that forces on sections and actuators supply.")
+      .def_ro("modal", &MotionForces::modal, "(T, n_v) modal forces that sections and actuators have to supply.")
       .def_ro("rotors", &MotionForces::rotors, "(T, 3 bodies) rate of angular momentum of the rotor in each joint.");
 }
 

@@ -9,10 +9,10 @@
 void bind_forward_motion(nb::module_ &m) {
   nb::class_<LinearOutput>(m, "LinearOutput", "An output that is linear in the state (q, v).")
       .def(nb::init<std::vector<int>, std::vector<double>>(), "entries"_a, "weights"_a);
-  nb::class_<PlaceOutput>(m, "PlaceOutput", "Three outputs: where a section of a body is, m, global axes.")
+  nb::class_<PlaceOutput>(m, "PlaceOutput", "Three outputs: position of a section of a body, m, global axes.")
       .def(nb::init<int, Vector3d, MatrixXd, std::vector<MatrixXd>>(), "body"_a, "position"_a, "Phi"_a, "K"_a);
   nb::class_<ForwardModel>(m, "ForwardModel",
-                           "All that a motion under held inputs needs; see mbs/core/forward/forward_motion.h.")
+                           "Data of a motion under held inputs, for FMUs; see mbs/core/forward/forward_motion.h.")
       .def(
           "__init__",
           [](ForwardModel *model, const std::vector<BodyModel<SpatialData>> &bodies,
@@ -24,7 +24,7 @@ void bind_forward_motion(nb::module_ &m) {
             model->joint_forces = scene.joint_forces, model->gears = scene.gears;
           },
           "bodies"_a, "ground"_a, "rows"_a, "wrenches"_a, "gravity"_a, "scene"_a,
-          "Of the scene joint forces, gears and cut joints.")
+          "The scene has joint forces, gears and cut joints.")
       .def_rw("guid", &ForwardModel::guid)
       .def_rw("inputs", &ForwardModel::inputs)
       .def_rw("linear", &ForwardModel::linear)
@@ -41,5 +41,5 @@ void bind_forward_motion(nb::module_ &m) {
             const std::string bytes = bytes_of(model);
             return nb::bytes(bytes.data(), bytes.size());
           },
-          "What FMUs read.");
+          "Bytes that FMUs read.");
 }

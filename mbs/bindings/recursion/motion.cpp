@@ -80,14 +80,12 @@ template <class Space> void bind_motion(nb::module_ &m) {
       "tree_motion", &motion_of<Space>, "model"_a, "scene"_a, "times"_a, "q"_a, "v"_a, "controls"_a, "carry_on"_a,
       "checkpoint"_a = nb::none(), "samples"_a = nb::none(), "recording"_a = nb::none(), "replay"_a = nb::none(),
       "judged"_a = nb::none(),
-      "Integrates the motion from (q, v) at the first of `times`, or on from a checkpoint, which it moves, and "
-      "reports\n"
-      "it at all of them; rows of outputs that were delivered before mean nothing. carry_on(t), which is called now "
-      "and\n"
-      "then, ends it where it gives False. A recording keeps its steps; a replay acts beside the scene. Errors of the\n"
-      "motors of `judged`, the same mechanism, are bounded, too.");
+      "Integrate from (q, v) at the first of `times`, or from a checkpoint, which is moved, with outputs at `times` "
+      "(s);\nthose before the checkpoint are undefined. carry_on(t), called now and then, ends the run where it is\n"
+      "False. A recording keeps the steps; a replay acts beside the scene. Errors of the motors of `judged`, the same\n"
+      "mechanism, are bounded, too.");
   m.def("tree_outputs", &outputs_of<Space>, "model"_a, "scene"_a, "times"_a, "states"_a, "replay"_a = nb::none(),
-        "What a run reports of states (T, n_q + n_v) that are known.");
+        "Outputs at known states (T, n_q + n_v) at `times` (s).");
 }
 
 void bind_checkpoint(nb::module_ &m) {
@@ -108,7 +106,7 @@ void bind_report(nb::class_<TreeRun> run) {
       .def_ro("time_reached", &TreeRun::time)
       .def_ro("last_step", &TreeRun::last_step)
       .def_ro("last_error", &TreeRun::last_error)
-      .def_ro("rounding", &TreeRun::rounding, "What rounding may have added to errors, in the unit of the tolerance.")
+      .def_ro("rounding", &TreeRun::rounding, "Largest error by round-off, in the unit of the tolerance.")
       .def_prop_ro(
           "changes",
           [](const TreeRun &r) {
@@ -119,16 +117,16 @@ void bind_report(nb::class_<TreeRun> run) {
           },
           "Of integrators: (time, from, to, mean step before) of each.")
       .def_ro("step_ends", &TreeRun::step_ends,
-              "Times (s) where steps ended, as controls ask for them; none where they cannot be repeated.");
+              "Ends (s) of steps, with keep_steps of the controls; empty where they cannot be repeated.");
 }
 
 void bind_run(nb::module_ &m) {
   auto run = nb::class_<TreeRun>(m, "TreeRun", "A motion in joint coordinates at outputs, as far as it got.");
   bind_report(run);
   run.def_ro("least_ratio", &TreeRun::least_ratio,
-             "Of the scene's watch: 1 without; see mbs/core/recursion/motion/mobility.h.")
-      .def_ro("singular_at", &TreeRun::singular_at, "When that was, s.")
-      .def_ro("singular_posture", &TreeRun::singular_posture, "(n_q) q there; empty without a watch.")
+             "Least ratio of singular values in watched postures, 1 without; mbs/core/recursion/motion/mobility.h.")
+      .def_ro("singular_at", &TreeRun::singular_at, "Time of the least ratio, s.")
+      .def_ro("singular_posture", &TreeRun::singular_posture, "(n_q) q then; empty without a watch.")
       .def_prop_ro(
           "ranges",
           [](const TreeRun &r) {
@@ -137,12 +135,12 @@ void bind_run(nb::module_ &m) {
               found.emplace_back(least, largest, left_at);
             return found;
           },
-          "Of each limit of the scene: least and largest value, and when it was left first (s) or None.")
+          "By limit of the scene: least and largest value, and time (s) when it was left first, or None.")
       .def_ro("last", &TreeRun::last, "(q, v) of the last accepted step.")
       .def_ro("states", &TreeRun::states, "(T, n_q + n_v) q, then v.")
       .def_ro("accelerations", &TreeRun::accelerations, "(T, n_v)")
-      .def_ro("multipliers", &TreeRun::lambda, "(T, rows); 0 of rows that depend on others.")
-      .def_ro("replayed", &TreeRun::replayed, "(T, numbers) of the source of a replay.");
+      .def_ro("multipliers", &TreeRun::lambda, "(T, rows); 0 of equations that depend on others.")
+      .def_ro("replayed", &TreeRun::replayed, "(T, numbers) forces of the source of a replay.");
 }
 
 void bind_orientation_laws(nb::module_ &m) {
@@ -189,7 +187,7 @@ void bind_loads(nb::class_<Scene> scene) {
       .def(
           "add_point_force",
           [](Scene &s, int wrench, const StateFunction &function) { s.point_forces.push_back({wrench, function}); },
-          "wrench"_a, "function"_a, "Of the motion of the section on which a wrench of the model acts.")
+          "wrench"_a, "function"_a, "A force by the motion of the section on which a wrench of the model acts.")
       .def(
           "add_cut_load",
           [](Scene &s, int joint, const TimeFunction &magnitude, double share) {
@@ -231,31 +229,31 @@ void bind_joint_forces(nb::class_<Scene> scene) {
 }
 
 void bind_scene(nb::module_ &m) {
-  auto scene = nb::class_<Scene>(m, "TreeScene", "What a mechanism in joint coordinates follows and what acts on it.");
+  auto scene = nb::class_<Scene>(m, "TreeScene", "Targets of a mechanism in joint coordinates, and forces on it.");
   bind_loads(scene), bind_joint_forces(scene);
   scene.def(nb::init<>())
       .def(
           "add_target", [](Scene &s, const TimeFunction &law, double sign) { s.targets.push_back({law, sign}); },
-          "target"_a, "sign"_a = 1.0, "Of the next row: sign target(t).")
+          "target"_a, "sign"_a = 1.0, "Of the next constraint equation: sign target(t).")
       .def(
           "watch_posture",
           [](Scene &s, const std::vector<bool> &is_path, double length) {
             s.watch = PostureWatch{{is_path.begin(), is_path.end()}, length};
           },
           "is_path"_a, "length"_a,
-          "Watch how well the joints can follow the rows of the path; the run diverges where they cannot at all.")
+          "Watch how well the joints can follow the equations of the path; the run diverges where they cannot.")
       .def(
           "add_limit",
           [](Scene &s, Index v, double lowest, double highest) { s.limits.push_back({v, lowest, highest}); }, "v"_a,
           "lowest"_a, "highest"_a,
           "Watch whether the coordinate with this index in v, a number, stays in a range; the run does not end there.")
-      .def_rw("has_loops", &Scene::has_loops, "Whether rows close loops: the run ends where these are singular.")
-      .def_rw("keeps_all_rows", &Scene::keeps_all_constraints, "Whether no rows depend on others.")
+      .def_rw("has_loops", &Scene::has_loops, "Whether equations close loops: the run ends where these are singular.")
+      .def_rw("keeps_all_rows", &Scene::keeps_all_constraints, "Whether all constraint equations are independent.")
       .def_rw("modal_amplitude_limits", &Scene::modal_amplitude_limits,
               "(bodies) kg m^2: largest p^T p of each that makes sense; empty: any.")
       .def(
           "turn_marker", [](Scene &s, int marker, const OrientationLaw &law) { s.driven.push_back({marker, law}); },
-          "marker"_a, "law"_a, "How a marker of the ground turns, which the model says it does.");
+          "marker"_a, "law"_a, "Orientation of a turning marker of the ground.");
 }
 
 } // namespace

@@ -199,7 +199,7 @@ void make_driven(DrivenMechanism<Space> *made, const Model<Space> &model, const 
 
 template <class Space> void bind_driven(nb::module_ &m, const std::string &space) {
   using Driven = DrivenMechanism<Space>;
-  nb::class_<Driven>(m, (space + "Driven").c_str(), "A mechanism under its scene with motors, and what its path is.")
+  nb::class_<Driven>(m, (space + "Driven").c_str(), "A mechanism under its scene, with motors and a path.")
       .def("__init__", &make_driven<Space>, "model"_a, "scene"_a, "is_path"_a, nb::keep_alive<1, 2>(),
            nb::keep_alive<1, 3>(), "is_path: of each constraint equation; others close loops.")
       .def(
@@ -215,8 +215,8 @@ template <class Space> void bind_driven(nb::module_ &m, const std::string &space
       .def("path_forces_on_bodies", &path_forces_on_bodies<Space>, "times"_a, "q"_a, "multipliers"_a,
            "The same on each body alone, (T, 6 + n) in 3D: on its frame, in axes of that, and on its modes.")
       .def("split", &split<Space>, "q"_a, "wanted"_a,
-           "(tau (T, motors), left (T, n_v), loops (T, constraint equations of loops)): what motors do of generalized "
-           "forces\n(T, n_v), what they and loops leave, and multipliers of the loops.");
+           "(tau (T, motors), left (T, n_v), loops (T, constraint equations of loops)): motor torques for generalized "
+           "forces\n`wanted` (T, n_v), the part that they and loops leave, and multipliers of the loops.");
 }
 
 template <class Space> void bind_motion(nb::module_ &m, const std::string &space) {
@@ -229,7 +229,7 @@ template <class Space> void bind_motion(nb::module_ &m, const std::string &space
           "driven", [](const Motion &motion) -> const Driven & { return motion.driven(); },
           nb::rv_policy::reference_internal)
       .def("hold_loads", &Motion::hold_loads, "start"_a, "end"_a,
-           "Loads are before and after these times (s) what they are there.")
+           "Loads are constant before and after these times (s).")
       .def("left_on_modes", &left_on_modes<Space>, "times"_a, "p"_a, "p_dot"_a, "p_ddot"_a, "near"_a,
            "(q (T, n_q), forces on modes (T, n)) that neither motors, or constraint equations without any, nor loads "
            "supply,\nwith modes of all bodies (T, n), from postures near (T, n_q), or each from the last, the first "
@@ -239,9 +239,9 @@ template <class Space> void bind_motion(nb::module_ &m, const std::string &space
            "(M, D, K), (T, (n + motors) n) each: exact derivatives of these forces, and of torques, by p_ddot, p_dot\n"
            "and p, less what motors that turn frames do beside.")
       .def("motion", &states_of<Space>, "times"_a, "p"_a, "p_dot"_a, "p_ddot"_a, "near"_a,
-           "States and forces for the same arguments; NaN where no posture is found.");
+           "States and forces for the arguments of left_on_modes; NaN where no posture is found.");
   nb::class_<RedefinedMotion<Space>, Motion>(m, (space + "RedefinedMotion").c_str(),
-                                             "With the motors of the motion that follows a path.")
+                                             "Motors as on the path with deflections factor p + offset(t).")
       .def(nb::init<Driven, Driven, VectorXd, double, std::vector<TimeFunction>>(), "driven"_a, "path"_a, "q"_a,
            "factor"_a, "offset"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>());
 }
@@ -257,7 +257,7 @@ void bind_prescribed(nb::module_ &m) {
       .def_ro("a", &Prescribed::a, "(T, n_v)")
       .def_ro("required", &Prescribed::required, "(T, n_v) M a - Q.")
       .def_ro("multipliers", &Prescribed::multipliers, "(T, constraint equations) with joints that move freely.")
-      .def_ro("tau", &Prescribed::tau, "(T, motors) in place of these.")
-      .def_ro("left", &Prescribed::left, "(T, n_v) what motors and loops leave of `required`.")
+      .def_ro("tau", &Prescribed::tau, "(T, motors) motor torques in place of these.")
+      .def_ro("left", &Prescribed::left, "(T, n_v) part of `required` that motors and loops leave.")
       .def_ro("loops", &Prescribed::loops, "(T, constraint equations of loops) their multipliers under the motors.");
 }

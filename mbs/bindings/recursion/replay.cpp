@@ -77,16 +77,16 @@ Source prescribed(PrescribedMotion<Space> &motion, const std::vector<ModalShape>
 }
 
 template <class Space> void bind_found_forces(nb::module_ &m, const std::string &space) {
-  nb::class_<ForceReader<Space>>(m, (space + "ForceReader").c_str(), "What is read of states of a motion.");
+  nb::class_<ForceReader<Space>>(m, (space + "ForceReader").c_str(), "Reads forces off states of a motion.");
   m.def("actuator_reader", &actuators_of<Space>, "driven"_a, "limit"_a, "patches"_a, nb::keep_alive<0, 1>(),
         "Forces of motors within limits, then voltages of the patches of links: (first mode in v, modal forces that "
         "they\nreach by those on the modes, allocation).");
   m.def("path_reader", &paths_of<Space>, "driven"_a, "axes"_a, "parts"_a, "count"_a, nb::keep_alive<0, 1>(),
         "Forces of constraint equations (number, column, sign): see mbs/core/analysis/found_forces.h.");
   m.def("recorded_forces", &recorded<Space>, "driven"_a, "recording"_a, "reader"_a, nb::keep_alive<0, 1>(),
-        nb::keep_alive<0, 2>(), nb::keep_alive<0, 3>(), "Read of a recorded run.");
+        nb::keep_alive<0, 2>(), nb::keep_alive<0, 3>(), "Forces that are read off a recorded run.");
   m.def("prescribed_forces", &prescribed<Space>, "motion"_a, "shape"_a, "q"_a, "reader"_a, nb::keep_alive<0, 1>(),
-        nb::keep_alive<0, 4>(), "Read of a prescribed motion; shape: p(t) by body; q (n_q): near the first posture.");
+        nb::keep_alive<0, 4>(), "Forces of a prescribed motion; shape: p(t) by body; q (n_q): near the first posture.");
 }
 
 RowMajor sampled(ForceSource &source, const std::vector<double> &times) {
@@ -115,13 +115,13 @@ void make_replay(Replay *made, Source source, const ZeroOrderHold &along,
 void bind_replay(nb::module_ &m) {
   nb::class_<ForceSource>(m, "ForceSource", "Forces and voltages that an earlier analysis found, at any time of it.")
       .def("sample", &sampled, "times"_a, "(T, numbers) at times (T,).");
-  nb::class_<ForcesOfTime, ForceSource>(m, "ForcesOfTime", "Of functions of time.")
+  nb::class_<ForcesOfTime, ForceSource>(m, "ForcesOfTime", "Forces that are functions of time.")
       .def(nb::init<std::vector<TimeFunction>>(), "functions"_a);
-  nb::class_<ForcesOfBoth, ForceSource>(m, "ForcesOfBoth", "The numbers of one source, then those of another.")
+  nb::class_<ForcesOfBoth, ForceSource>(m, "ForcesOfBoth", "The forces of one source, then those of another.")
       .def(nb::init<Source, Source>(), "first"_a, "second"_a);
-  nb::class_<Replay>(m, "Replay", "What acts in a run: the numbers of a source.")
+  nb::class_<Replay>(m, "Replay", "Forces of a source that act in a run.")
       .def("__init__", &make_replay, "source"_a, "along"_a, "at_points"_a,
-           "along: what units of them do along v; at_points: (number, entry in wrenches, share).");
+           "along: generalized forces of a unit of each; at_points: (number, entry in wrenches, share).");
   bind_found_forces<Planar>(m, "Planar");
   bind_found_forces<Spatial>(m, "Spatial");
   m.def("point_reader", &points_of, "driven"_a, "bodies"_a, nb::keep_alive<0, 1>(),

@@ -55,8 +55,7 @@ template <class Space> void bind_sampled_motion(nb::module_ &m) {
   m.def("tree_sampled", &sampled_motion_of<Space>, nb::kw_only(), "model"_a, "scene"_a, "times"_a, "q"_a, "v"_a,
         "controls"_a, "carry_on"_a, "held"_a, "first_command"_a, "samples"_a, "delay"_a, "controller"_a,
         "between"_a = nb::none(),
-        "As tree_motion, under commands that `controller`(k, t, (q, v, a)) gives at samples and that act as `held` "
-        "says.");
+        "As tree_motion, under commands of `controller`(k, t, (q, v, a)) at samples, which act through `held`.");
   m.def("tree_outputs_under", &outputs_under_hold<Space>, "model"_a, "scene"_a, "times"_a, "states"_a, "held"_a,
         "commands"_a, "As tree_outputs, under commands (T, inputs).");
 }
@@ -65,7 +64,7 @@ template <class Space> void bind_sampled_motion(nb::module_ &m) {
 
 void bind_tree_sampled(nb::module_ &m) {
   nb::class_<ZeroOrderHold>(m, "ZeroOrderHold",
-                            "What a unit of each command does: see mbs/core/recursion/motion/zero_order_hold.h.")
+                            "Forces of a unit of each command: see mbs/core/recursion/motion/zero_order_hold.h.")
       .def(nb::init<MatrixXd>(), "direction"_a, "Generalized forces (n_v, inputs).")
       .def(
           "add_frame_motor",
@@ -74,7 +73,7 @@ void bind_tree_sampled(nb::module_ &m) {
             held.add_frame_motor(input, {q, v, rotation, axis});
           },
           "input"_a, "q"_a, "v"_a, "rotation"_a, "axis"_a,
-          "What a motor that turns the frame of a body takes back on its modes: FrameShare there.");
+          "Modal forces of a motor that turns the frame of a body: see FrameShare there.");
   bind_sampled_motion<Planar>(m);
   bind_sampled_motion<Spatial>(m);
 }
