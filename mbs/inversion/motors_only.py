@@ -107,7 +107,7 @@ def durations(linear: Linearisation, given: Iterable[float | None], step: float)
 
 
 def cause_of(inversion: Inversion) -> str:
-    """Why no motion was found, and when: zeros that change sides or pass infinity, or its iteration; else ""."""
+    """Why no motion was found, and when: zeros change sides or pass infinity, no convergence; else ""."""
     linear, is_coarse = inversion.linearisation, inversion.status == "mesh too coarse"
     if not is_coarse and inversion.status != "inversion not converged":
         return ""

@@ -77,8 +77,8 @@ def newton(
 ) -> tuple[Array, Booleans]:
     """Newton's method from `states` (T, …) in at most `most` steps: the states it leads to, and which converge (T,).
 
-    `correct`(states, their numbers), called for those that do not converge yet, returns their steps (T, n) in natural
-    sizes, and which converge with these (T,). `move`(states, steps) returns the next states.
+    `correct`(states, their numbers), called for those that do not converge yet, returns their steps (T, n), scaled to
+    order 1, and which converge with these (T,). `move`(states, steps) returns the next states.
     """
     states, met, going = states.copy(), np.zeros(len(states), dtype=bool), np.arange(len(states))
     for _ in range(most):
@@ -195,7 +195,7 @@ class Statics:
         return Balance(Q, Q - multipliers @ J, missed, J, multipliers, independent=independent, size=size)
 
     def stiffness(self, q: Array, at: Balance) -> Array:
-        """Exact ∂(C_vᵀ λ − Q)/∂q (n_v, n_v) in natural sizes at q (n_q,), rad and m, with the multipliers of `at`."""
+        """Exact ∂(C_vᵀ λ − Q)/∂q (n_v, n_v) in units of `Balance` at q (n_q,), rad and m, with multipliers of `at`."""
         multipliers = at.multipliers / self.row_sizes * self.model.row_signs
         K = self.system.core.stiffness_at_rest(self.system.scene, self.t, q, multipliers, at.independent)
         return K * self.sizes * self.sizes[:, None]

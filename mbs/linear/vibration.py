@@ -66,7 +66,7 @@ def gear_matrices(tree: KinematicTree, q: Array) -> tuple[Array, Array]:
 
 
 def elastic_shapes(M: Array, K: Array, C_v: Array) -> tuple[Array, Array]:
-    """ω² (n,), 1/s², and M-orthonormal shapes (n_v, n) that strain springs while C_v q̇ = 0; all in natural sizes."""
+    """ω² (n,), 1/s², and M-orthonormal shapes (n_v, n) that strain springs while C_v q̇ = 0; units are those of M, K."""
     free = null_space(C_v, DEPENDENT)
     L_inverse = np.linalg.inv(np.linalg.cholesky(free.T @ M @ free))
     squares, vectors = np.linalg.eigh(L_inverse @ free.T @ K @ free @ L_inverse.T)

@@ -28,7 +28,7 @@ class Mobility:
     Attributes:
         freedom: number of degrees of freedom that joints and loops leave.
         followed: how many of these the trajectories prescribe.
-        ratio: smallest by largest singular value of the path's equations in these freedoms, lengths by the robot's.
+        ratio: smallest by largest singular value of the path's equations in these freedoms, lengths by robot size.
         left: joints that still move with all trajectories prescribed.
         loop_rank: rank of the loops' constraint equations.
     """

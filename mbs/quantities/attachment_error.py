@@ -23,7 +23,7 @@ JOLT = 0.01  # of the largest deformation: where more begins to ring at once, mo
 
 
 class Start(NamedTuple):
-    """Start of a run in natural sizes: M (n_v, n_v), gradients C_q (constraints, n_v), accelerations a (n_v,).
+    """Start of a run, coordinates scaled by the robot: M (n_v, n_v), C_q (constraints, n_v), accelerations a (n_v,).
 
     K (n_v,), D (n_v, n_v) and `late` (n_v,), 1/ω_m² − 1/ω² of `mode_error`, s², are 0 except for modal coordinates.
     """

@@ -183,16 +183,16 @@ class TrackedPath(AroundPath):
     """Actuation with which a path is tracked."""
 
     _: KW_ONLY
-    least_voltage: float  # V, the largest voltage that is needed at least, of the patch next to its limit
-    least_voltage_doubt: float  # V, by how much a finer mesh may change it, estimated; infinite where it did not settle
-    least_share: float  # the same as a share of the limits; NaN where no patch has any
+    least_voltage: float  # V, the least possible peak voltage, of the patch that is nearest to its limit
+    least_voltage_doubt: float  # V, estimated change by a finer mesh; infinite where it did not converge
+    least_share: float  # least voltage as a share of the limits; NaN where no patch has any
     objective: Objective  # "least-voltage" in place of that of the scene beyond limits, and if no voltage is needed
     cost: float  # the effort, without unit
     unmet: float  # largest residual modal force between Gauss points, relative to the largest elastic one
     bounds: Bounds | None  # what each zero requires, V; None where motors alone have no bounded motion
     prices: Mapping[str, Mapping[str, Array]]  # `Tracked.prices` by kind, then by body, of torques by joint
     path_tolerance: float | None  # m, by which coordinates of points may be off their path
-    tolerance_price: float | None  # V/m, by how much less the least voltage is for a larger path tolerance
+    tolerance_price: float | None  # V/m, decrease of the least voltage per path tolerance
     # largest deviation from the path with the same torques but no voltages, m or rad; NaN where not found
     without_patches: float = np.nan
     is_needed: bool = True  # whether `without_patches` is more than the tolerance times the path's way
