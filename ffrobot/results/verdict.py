@@ -49,7 +49,7 @@ STILL = 0.01  # of the tolerance within which a point has settled: a smaller res
 
 
 def vibrates(about: Mapping[str, Any]) -> bool:
-    """Whether attributes of `settling/POINT` have a settling time, or residual vibration that matters."""
+    """Whether attributes of `settling/POINT` have a settling time not 0, or residual vibration that matters."""
     return bool(about["residual"] > STILL * about["tolerance"] or about["time_to"] != 0.0)
 
 

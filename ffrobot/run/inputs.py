@@ -19,7 +19,7 @@ PROGRAM = "ffrobot"
 
 
 def named_files(data: Any, folder: Path) -> Iterator[Path]:
-    """Yield the files that tables (`data`) of a TOML file in `folder` name, and files that these name in turn."""
+    """Yield the files that tables (`data`) of a file in `folder` name, and those that link files among them name."""
     for key, file in _named(data, folder):
         yield from files_with_included(file)
         if key == "link":  # whose own links, which are none, are not followed: they might lead in a circle

@@ -46,8 +46,8 @@ ADVICE = {
 class Statistics:
     """Statistics of a run; `cause` is the reason of an early end at `time_reached`, s.
 
-    `rejected` steps are not in `steps`; `evaluations` are of the equations of motion. `step_ends` (N,), s, of a run
-    that keeps its steps repeat it.
+    `rejected` steps are not in `steps`; `evaluations` are of the equations of motion. `step_ends` (N,), s, if kept,
+    repeat the run. `warnings`: a text each.
     """
 
     status: str = "completed"
