@@ -78,7 +78,7 @@ class Unsupplied:
 
 
 def quasi_static_shift(run: Run, modal: Mapping[str, Array], points: Iterable[str]) -> dict[str, Array]:
-    """Return the shift (T, 3), m, global axes, of points by name where `modal` forces F (T, n), N/√kg, by body lack.
+    """Return the shift (T, 3), m, global axes, of points by name if `modal` forces F (T, n), N/√kg, by body lack.
 
     With motors locked, to first order and quasi-static: δp = −K⁻¹ F.
     """

@@ -93,8 +93,8 @@ class LoopMotion:
 def ringing(time: Array, place: Array, lowest: float) -> tuple[float, float]:
     """Return about which frequency (Hz) vibration is measured, and how long (s) before the end of `time` (T,), s.
 
-    The time has `PERIODS` of the frequency `lowest`, Hz, within the rest of the `place` (T, d), m, of the tip, or in
-    half of a run that does not rest. If too few fit (at rest `LEAST_PERIODS`), a higher frequency of which they fit.
+    `PERIODS` of the frequency `lowest`, Hz, within the time for which the `place` (T, d), m, of the tip rests, or in
+    half of a run without rest. If these (at rest `LEAST_PERIODS`) do not fit, the frequency is higher.
     """
     whole = float(time[-1] - time[0])
     way = np.linalg.norm(place - place[-1], axis=1)

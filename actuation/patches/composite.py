@@ -76,7 +76,7 @@ def composite(placed: Sequence[PlacedLayout], body: ModalBody) -> tuple[Array, A
     """Return the mutual effects of the k patches of all layouts and their link, over n modes of the modal body.
 
     These are the stiffness (n, n), rad²/s², that patches add; modal forces per volt (k, n), N/(√kg·V), by which the
-    layers' stiffness reduces those on a straight link; and what residual strains add to capacitances (k,), F, which is
+    layers' stiffness reduces those on a straight link; and what residual strains add to capacitances (k, k), F:
     0 where rigidities are not known.
     """
     layers = layers_on_link(placed, body)

@@ -75,7 +75,7 @@ class LinkPatches:
         return self.bodies[self.body].Phi_V
 
     def voltages(self, F_p: Array) -> dict[str, Voltages]:
-        """Return the voltages by layout for modal forces F_p (T, n), N/√kg, of which all layouts share `unmet`."""
+        """Return voltages by layout for modal forces F_p (T, n), N/√kg; `unmet` is what all layouts together lack."""
         found = solve_voltages(self.reach, self.reach.modes.forces(F_p))
         return self._by_layout(found.required, found.within_limit, F_p)
 
