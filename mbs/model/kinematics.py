@@ -130,7 +130,7 @@ def moves(node: Node) -> bool:
 
 
 def rows_of(body: Body, section: Section) -> tuple[Array, Array, list[Array]]:
-    """Return Φ over Φ_r (6, n), 1/√kg, 1/(√kg·m), position (3,), m, and six or no `Stiffening.K_points` (n, n)."""
+    """Return Φ over Φ_r (6, n), 1/√kg, 1/(√kg·m), position (3,), m, of a section, its `Stiffening.K_points` (n, n)."""
     if not section.point:
         return np.zeros((6, body.n_modes)), np.zeros(3), []
     at = body.points[section.point]
@@ -218,12 +218,12 @@ class Kinematics:
         )
 
     def values(self, q: Array, times: Array) -> tuple[Array, Array]:
-        """Return C (T, rows), m or rad, at q (T, n_q) and `times` (T,), s, and its Jacobian C_v (T, rows, n_v)."""
+        """Return equations C (T, rows), m or rad, at q (T, n_q) and `times` (T,), s; Jacobian C_v (T, rows, n_v)."""
         values, gradients = self.core.constraints(self.scene, times.tolist(), q)
         return self.signs * values, self.signs[:, None] * gradients.reshape(len(q), len(self.signs), self.core.n_v)
 
     def rates(self, q: Array, v: Array, times: Array) -> Array:
-        """Return Ċ (T, rows), m/s or rad/s, at q (T, n_q), v (T, n_v) and `times` (T,), s."""
+        """Return rates Ċ (T, rows), m/s or rad/s, of the equations at q (T, n_q), v (T, n_v), `times` (T,), s."""
         return self.signs * self.core.constraint_rates(self.scene, times.tolist(), q, v)
 
 

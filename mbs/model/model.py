@@ -178,7 +178,7 @@ class Model:
         return replace(self, rows=tuple(row for row in self.rows if not row.is_trajectory))
 
     def modal_directions(self, on_modes: Mapping[str, Array]) -> Array:
-        """Return generalized forces (k, n_v) of k forces (n, k), N/√kg, on the modes of files by body; or gradients."""
+        """Return generalized forces (k, n_v) of k forces (n, k), N/√kg, on the modes of files by body."""
         (count,) = {forces.shape[1] for forces in on_modes.values()}
         directions = np.zeros((count, self.tree.n_v))
         for node in self.tree.nodes:

@@ -298,7 +298,7 @@ class SplitForces(NamedTuple):
 
 
 def split_forces(model: Model, q: Array, wanted: Array) -> SplitForces:
-    """Solve Gᵀτ + EᵀF_p − C_cᵀλ_c = `wanted` (T, n_v), N, N·m, N/√kg, at q (T, n_q): recursion/inverse/motors.h."""
+    """Solve Gᵀτ + EᵀF_p − C_cᵀλ_c = `wanted` (T, n_v), SI, at q (T, n_q) for torques, modal and loop forces."""
     tau, left, multipliers = driven_mechanism(model).split(q, wanted)
     return SplitForces(model.by_motor(tau), left, multipliers)
 
