@@ -38,7 +38,7 @@ def remarks_on_link(link: Link, label: str) -> Iterator[str]:
 
 
 def is_beam(link: Link | None) -> TypeGuard[BeamLink]:
-    """Whether a link is there, and a beam."""
+    """Whether `link` is a beam, and not None."""
     return link is not None and link.geometry.kind == "beam"
 
 

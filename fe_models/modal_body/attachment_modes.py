@@ -141,11 +141,11 @@ def uncoupled(K: Array, of: Integers) -> tuple[Array, Array, Integers]:
 def interface_loads(
     omega2: Array, eigenmodes: int, interfaces: Mapping[str, Interface]
 ) -> tuple[Array, dict[str, Array]]:
-    """The loads that bend a link into each of its n modes, as far as they are loads at interfaces.
+    """The inertia and the loads at interfaces that deform a link into each of its n modes Y, K Y = M Y W + B c.
 
-    Returns W (n, n), rad²/s², and by interface c (6, n), force in N and moment in N·m per unit of modal coordinate: for
-    the modes Y, K Y = M Y W + B c. An eigenmode x has K x = ω² M x. A residual mode r = R c, after so many `eigenmodes`
-    X, has K r = Bc − M X XᵀBc; c follows from the work rᵀBc = rᵀKr.
+    Returns W (n, n), rad²/s², and by interface c (6, n), force in N and moment in N·m per unit of modal coordinate. B
+    are unit loads. An eigenmode x has K x = ω² M x. A residual mode r = R c, after so many `eigenmodes` X, has
+    K r = Bc − M X XᵀBc; c follows from the work rᵀBc = rᵀKr.
     """
     W, of = np.diag(omega2), slice(eigenmodes, None)
     W[of, of] = 0.0

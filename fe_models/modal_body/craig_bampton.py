@@ -157,7 +157,7 @@ class CraigBampton:
 
 
 def craig_bampton(body: ModalBody) -> CraigBampton:
-    """Return Craig–Bampton matrices of a body with that reference condition, exactly from its invariants."""
+    """Return Craig–Bampton matrices of a body with this reference condition, exactly from its invariants."""
     omega2 = np.diag(body.stiffness)
     static = body.mode_count - body.eigenmode_count
     coordinates = interface_coordinates(omega2, body.family, static, body.interfaces)

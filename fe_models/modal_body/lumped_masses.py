@@ -114,7 +114,7 @@ def loads_with_lumps(names: Sequence[str], attached: Iterable[Lump]) -> Array:
 def with_lumped_stiffness(matrices: Array, names: Sequence[str], attached: Sequence[Lump]) -> dict[str, Array]:
     """Geometric stiffness (n, n), rad²/s² per unit of load, by unit load, with lumps: their inertia and turning.
 
-    `matrices` (l, n, n) are those of the bare link.
+    `matrices` (l, n, n) are those without lumps.
     """
     total = np.tensordot(loads_with_lumps(names, attached).T, matrices, axes=1)
     for lump in attached:

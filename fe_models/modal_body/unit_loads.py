@@ -38,7 +38,7 @@ def loads_at(names: Sequence[str], interface: str) -> slice:
 
 
 def inertia_wrenches(x: Array, mass: Array, inertia: Array) -> Array:
-    """D'Alembert force and moment (q, 6, `MOTIONS`) of small bodies for each unit motion of the frame.
+    """D'Alembert force, N, and moment, N·m (q, 6, `MOTIONS`), of q small bodies for each unit motion of the frame.
 
     Frame acceleration a, angular acceleration α and angular velocity ω (Newton and Euler): force −m [a + α × x + ω × (ω
     × x)], moment −J α − ω × J ω about the center; x (q, 3) m, `mass` (q,) kg, `inertia` (q, 3) J_x, J_y, J_z in kg·m².

@@ -1,4 +1,4 @@
-"""Three-dimensional linear elasticity in UFL: the matrices of a solid link, free in space. SI units.
+"""Linear elasticity in UFL: the matrices of a solid link, free in space. SI units; `owned`: nodes of this rank.
 
 The mass matrix of three equal displacement components is one scalar matrix, used three times: a ninth of the memory of
 the full one. The stiffness matrix is assembled straight into PETSc's symmetric block format (upper triangle, 3 × 3
@@ -63,7 +63,7 @@ class ScalarMass:
 
 @struct
 class SolidModel:
-    """Nodes, materials and matrices of a solid, before it is fixed anywhere."""
+    """Nodes (`owned`: of this rank), materials and matrices of a solid without supports."""
 
     mesh: Mesh  # distributed over `comm`
     order: int  # polynomial order of the displacements
@@ -144,7 +144,7 @@ class MassMatrix:
 def material_map(
     mesh: Mesh, material: AnyMaterial, regions: Sequence[tuple[NDArray[np.int32], AnyMaterial]] = ()
 ) -> MaterialMap:
-    """Return the `material` of all cells of this rank, ghosts too, but those of `regions`: (cells, their material)."""
+    """Assign `material` to all cells of this rank, ghosts too, except those of `regions`: (cells, their material)."""
     cells = mesh.topology.index_map(3)
     of_cell = np.zeros(cells.size_local + cells.num_ghosts, dtype=np.int64)
     for number, (members, _) in enumerate(regions, start=1):

@@ -1,4 +1,4 @@
-"""Mean motion of faces and cross sections of a solid: six linear functionals of its displacements. SI units.
+"""Mean motion of faces and cross sections of a solid, linear in u. SI units; `owned`: nodes of this rank.
 
 Area-weighted averages about the centroid c of the face (the RBE3 convention): translation ∫u ds / A, and rotation
 θ = J⁻¹ ∫ r × u ds with r = x − c and J = ∫ (r·r I − r rᵀ) ds: the rigid motion nearest to u in the mean square. Both

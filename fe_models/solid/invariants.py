@@ -1,4 +1,4 @@
-"""Inertia shape integrals of a solid, and the unit loads whose prestress stiffens it. SI units.
+"""Inertia shape integrals of a solid, unit loads and their prestress. SI units; `owned`: nodes of this rank.
 
 With displacements and coordinates in the same space, every integral of docs/theory.md is a product with the scalar mass
 matrix: x is its own nodal interpolation, so nothing is lumped and nothing is approximated.
@@ -55,7 +55,7 @@ def unit_loads(model: SolidModel, interfaces: Mapping[str, Array]) -> Array:
 
 
 def static_shapes(flexibility: Flexibility, loads: Array) -> Array:
-    """Return displacements (3 owned, l), m, under `loads` (3 owned, l), N, by the reference condition; collective."""
+    """Return displacements (3 owned, l), m, by `loads` (3 owned, l), N, under the reference condition; collective."""
     displacements = flexibility @ loads
     # Bending stresses cancel over a section: the round-off errors of an assembled K, small as they are, would show.
     return displacements + flexibility @ (loads - internal_forces(flexibility.model, displacements))

@@ -1,4 +1,4 @@
-"""Modes of a solid: the lowest of a family, however many others lie in between; attachment modes; Craig–Bampton.
+"""Modes of a solid: the lowest of a family, attachment modes, Craig–Bampton. `owned`: nodes of this rank.
 
 Families go by the kinetic energy in the mean motion of the cross sections. Of a mode with unit modal mass, their
 translation (u, v, w) and rotation (φ_x, φ_y, φ_z) carry the shares

@@ -1,4 +1,4 @@
-"""Strains and stresses of a solid: at points and on its surface, energies, geometric stiffness. Loads dolfinx.
+"""Strains, stresses, energies, geometric stiffness of a solid. Loads dolfinx. `owned`: nodes of this rank.
 
 At a point that several cells share, their strains and stresses are averaged: across elements they jump by the
 discretization error, and a point on the border of two materials takes the mean of both; all processes get the same.
