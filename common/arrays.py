@@ -16,6 +16,6 @@ PPoly = Any  # scipy.interpolate.PPoly, of which type checkers know nothing, and
 
 
 def null_space(J: Array, tolerance: float) -> Array:
-    """Orthonormal basis (k, m) of the null space of J (r, k): singular values to `tolerance` of the largest."""
+    """Orthonormal basis (k, m) of the null space of J (r, k): singular values below `tolerance` times the largest."""
     _, sizes, V = np.linalg.svd(J)
     return V[np.count_nonzero(sizes > tolerance * sizes.max(initial=0.0)) :].T

@@ -23,7 +23,7 @@ _PIECE = 1 << 20  # read into the same memory again: fresh pages would cost as m
 
 
 def sealed(content: bytes, line: str = _LINE) -> bytes:
-    """Return `content`, followed by `line` with the CRC-32 and the length of `content` put in."""
+    """Return `content`, followed by `line` filled in with its CRC-32 and length."""
     return content + line.format(zlib.crc32(content), len(content)).encode()
 
 

@@ -56,7 +56,7 @@ class Axis:
 
 
 def axis_of(servo: float | str, ratio: float) -> Axis:
-    """ω²/(s² + 2ζω s + ω²) of a natural frequency (Hz) and damping ratio, "NUMERATOR / DENOMINATOR", or a CSV table.
+    """Axis of `servo`: a natural frequency (Hz) of damping `ratio`, "NUMERATOR / DENOMINATOR", or a CSV table.
 
     Behind the denominator, whose numbers have blanks between them, "/ DELAY" (s) may follow. The table has measured
     values: frequency (Hz), magnitude, phase (degrees).
