@@ -237,6 +237,8 @@ def _describe(item: ErrorDetails, record: type[BaseModel], data: dict[str, Any],
     expected = template.format_map(context) if template else item["msg"].removeprefix("Input should be ")
     expected = expected.replace("'", '"')  # as TOML writes it
     hint = ""
+    if expected == "a list" and isinstance(value, dict) and len(loc) == 1:
+        hint = f" (write [[{key}]])"
     if kind == "literal_error" and isinstance(value, str):
         hint = did_you_mean(value, context["expected"].replace("'", "").replace(" or ", ", ").split(", "))
     return _Problem(key, f"expected {expected}", f", found {_show(value)}{hint}")

@@ -231,7 +231,7 @@ def _reference_problems(scene: SceneKeys) -> Iterator[str]:
             case "elastic joint" if name not in elastic:
                 yield f'{key}: expected a joint with stiffness ({quoted(elastic)}), found "{name}"'
             case "joint" if name not in joints:
-                yield f'{key}: expected one of the joints {quoted(joints)}, found "{name}"{did_you_mean(name, joints)}'
+                yield f'{key}: expected a joint ({quoted(joints)}), found "{name}"{did_you_mean(name, joints)}'
             case "joint" if name not in moving:
                 yield f'{key}: expected a joint that moves ({quoted(moving)}), found "{name}", a {joints[name].type}'
             case "flexible body" if name in bodies and bodies[name].rigid is not None:

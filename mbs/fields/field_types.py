@@ -70,11 +70,11 @@ GROUND = "ground"
 T = TypeVar("T")
 
 
-def split_point(reference: str) -> tuple[str, str]:
+def split_point(reference: str, also: str = "") -> tuple[str, str]:
     """Split `"link1.tip"` into `("link1", "tip")`. Raises `ValueError` when it is not of the form BODY.POINT."""
     body, dot, point = reference.partition(".")
     if not (body and dot and point) or "." in point:
-        raise ValueError(f'expected a point as "BODY.POINT", found "{shown(reference)}"')
+        raise ValueError(f'expected {also}a point as "BODY.POINT", found "{shown(reference)}"')
     return body, point
 
 
@@ -117,7 +117,7 @@ def _point(value: str) -> str:
 
 def _side(value: str) -> str:
     if value != GROUND:
-        split_point(value)
+        split_point(value, '"ground" or ')
     return value
 
 

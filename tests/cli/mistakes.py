@@ -31,6 +31,10 @@ _CHANGES = {
         ["expected a scene file, found a link file", "ffrobot link"],
     ),
     "unknown key in a link": ("link2.toml", {"density": "densty"}, ["link2.toml: material.densty", '"density"']),
+    "one bracket instead of two": (
+        {"[[trajectory]]": "[trajectory]"},
+        ["trajectory: expected a list, found", "(write [[trajectory]])"],
+    ),
     "wrong type": ({"end = 1.0": 'end = "1.0"'}, ['analysis "inverse": end: expected a number, found "1.0"']),
     "missing link file": (
         {'link = "link1.toml"': 'link = "link11.toml"'},
