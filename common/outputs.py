@@ -46,6 +46,8 @@ def check_not_an_input(path: Path) -> None:
 def check_file_name(text: str) -> Path:
     """Return `text` as a path. Raises `InputError` unless it can be the name of a regular file."""
     path = Path(text)
+    if not path.name and not (path := path.absolute()).name:
+        raise InputError(f"{path}: expected the name of a file", "a folder")
     _target(path, "expected the name of a file")
     check_regular(path)
     return path

@@ -62,10 +62,7 @@ cli.add_command(optimize, "optimize")
 
 
 def main() -> None:
-    """Run the command line.
-
-    Exit code 0, 1 where a solve failed, 2 for wrong input, 130 after Ctrl-C, 143 after SIGTERM.
-    """
+    """Run the command line; docs/reference/commands.md lists exit codes."""
     gc.set_threshold(200_000)  # what a command loads stays: searching it repeatedly costs a sixth of the start
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # it would read the metadata of all packages
     os.environ["MPLBACKEND"] = "agg"  # figures are files; Jupyter names a module of its own, which is not here

@@ -21,7 +21,6 @@ movie_options = together(
     click.option("--analysis", metavar="NAME", help="Analysis of the movie, or of the grid."),
     click.option("--scale", metavar="S", type=SCALE, help="Scale of deflections [chosen for visibility]."),
 )
-"""Options of movies."""
 
 
 @click.command()

@@ -29,7 +29,6 @@ class _FileName(click.Path):
 
 # Shared by all commands: click looks for a translation of each type's name.
 FILE = _FileName(path_type=Path)
-"""The type of arguments that are files."""
 _THERE = click.Path(path_type=Path, exists=True)
 _LOG = click.Path(dir_okay=False, writable=True, path_type=Path)
 

@@ -31,6 +31,7 @@ def test_mistake_in_a_link_of_its_own(two_link_copy, refused, link):
     ("arguments", "named"),
     [
         (("solve", "nowhere.toml"), "nowhere.toml: scene file not found"),
+        (("solve", "."), ": cannot read the scene file: Is a directory"),
         (("solve", "folder"), "folder: cannot read the scene file: Is a directory"),
         (("solve", "latin1.toml"), "latin1.toml: line 1: expected a scene file in UTF-8, found the byte 0xfc"),
         (("link", "nowhere.toml"), "nowhere.toml: link file not found"),
