@@ -9,6 +9,7 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from os import PathLike
+from os.path import isfile
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -300,9 +301,9 @@ class Results:
         check_known(name, files, f"{self.path}: expected a flexible body")
         file = files[name]
         for path in (file.path, self.path.parent / file.path.name):  # a folder that has been moved keeps both
-            if path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest() == file.sha256:
+            if isfile(path) and hashlib.sha256(path.read_bytes()).hexdigest() == file.sha256:
                 return path
-        now = "another" if file.path.is_file() else "none"
+        now = "another" if isfile(file.path) else "none"
         raise InputError(f'{file.path}: expected the modal body file that "{name}" was solved with', now)
 
     def modal(self, analysis: str, body: str) -> Array:
