@@ -16,9 +16,11 @@ from ...fe_models.modal_body import ModalBody
 from ..linear.vibration import elastic_shapes
 from ..model.body import Body, bent_section
 from ..model.known_motion import mass_matrices
+from ..model.nodes import Node
 from ..run.record import Run
 from .motion import constraint_rows, node_of, section_motion
 
+ROUND_OFF = 1e-12  # of a link's size
 JOLT = 0.01  # of the largest deformation: where more begins to ring at once, modes that are not there would ring, too
 
 
@@ -45,13 +47,11 @@ def mode_error(run: Run) -> float | None:
     dynamic part is about that of a vibration at ω_m between the highest eigenmode kept, ω_k, and the lowest attachment
     mode above it, ω_a (Rayleigh): ω_m² = ω_k ω_a. So δp = (1/ω_m² − 1/ω²) p̈, limited to the largest p where attachment
     modes ring at their own ω, as after a jump of the acceleration. The estimate is the largest √(δpᵀ K δp) of a link
-    against the largest √(pᵀ K p). Phase errors of vibrations from the start on are in `start_errors`. Both together are
-    0.2 to 5 times the error of the worst torque of arms with two or more modes, up to 10 times it with one
-    (tests/mbs/test_mode_error.py). Bending across the axes of all motors counts, too, as reactions contain it.
+    against the largest √(pᵀ K p). Phase errors of vibrations from the start on are in `start_errors`.
     """
     ratios = []
     for node in run.model.tree.nodes:
-        body, p, p_ddot = node.body, run.q[:, node.p_q], run.a[:, node.p_v]
+        body, p, p_ddot = node.body, _deformation(run, node), run.a[:, node.p_v]
         if not body.n_modes:
             continue
         if not body.attachment_modes or not body.n_eigenmodes:
@@ -62,6 +62,12 @@ def mode_error(run: Run) -> float | None:
         whole = np.sqrt((p**2 * body.stiffness).sum(axis=1).max(initial=0.0))
         ratios.append(float(wrong / whole) if whole else 0.0)
     return max(ratios, default=None)
+
+
+def _deformation(run: Run, node: Node) -> Array:
+    """Modal coordinates (T, n), √kg·m; 0 where they are round-off."""
+    p = run.q[:, node.p_q]
+    return p * (np.abs(p).max(initial=0.0) > ROUND_OFF * node.body.second_moment.trace() ** 0.5)
 
 
 def _late(body: Body) -> Array:
@@ -100,7 +106,7 @@ def start_of_motion(run: Run) -> Start:
     energy = np.zeros(len(run.time))
     for node in tree.nodes:
         stiffness[node.p_v], damping[node.p_v, node.p_v] = node.body.stiffness, node.body.damping
-        energy += run.q[:, node.p_q] ** 2 @ node.body.stiffness
+        energy += _deformation(run, node) ** 2 @ node.body.stiffness
         if node.body.attachment_modes and node.body.n_eigenmodes:
             late[node.p_v] = _late(node.body)
     (M,), sizes = mass_matrices(run.model, run.q[:1], float(run.time[0])), run.model.natural_sizes
