@@ -70,8 +70,8 @@ class Unsupplied:
         of_links = f"{'; '.join(links)}, quasi-static" if links else ", ".join(self.bodies)
         of_point = (
             f" With {'patches within their limits' if self.with_patches else 'motors only'}, {self.point} is off its"
-            f" path by {_length(self.angles_kept)} if joints are position-controlled on the computed angles"
-            f" ({_length(self.at_start)} at the start), and by {_length(self.moments_repeated)} and {self.drift} if the"
+            f" path by {_length(self.angles_kept)}, quasi-static, if joints are position-controlled on computed angles"
+            f" ({_length(self.at_start)} at the start), and by {_length(self.moments_repeated)} and {self.drift} if"
             ' computed torques are applied open loop. kind = "motors-only" finds torques that follow the path'
         )
         return f"no actuator provides all modal forces required on {of_links}.{of_point if self.point else ''}"
