@@ -61,10 +61,10 @@ def test_leaning_arm_keeps_to_its_line(solved):
     """Offsets, a leaning axis, bending in both planes, gravity, a payload: the replay in the nonlinear model."""
     leaning_arm = solved("arm_3r_motors_only")
     assert off_its_line(leaning_arm, "exact") < 1e-9
-    assert off_its_line(leaning_arm, "exact_forward") < 5e-6
+    assert off_its_line(leaning_arm, "exact_forward") < 1e-8
     assert off_its_line(leaning_arm, "joints_only") > 1e-3
     last = leaning_arm.file["exact_forward/points/fore.tip/position"][-1]
-    np.testing.assert_allclose(last, [0.40, 0.45, 0.65], atol=5e-6)
+    np.testing.assert_allclose(last, [0.40, 0.45, 0.65], atol=1e-8)
     for body in ("upper", "fore"):
         bent = np.abs(leaning_arm.file[f"exact/points/{body}.tip/deflection"]).max(axis=0)
         assert bent[1:].min() > 5e-4
