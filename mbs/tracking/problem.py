@@ -52,7 +52,7 @@ def track(
     p_s, points, (n, m) = shape_along(driven, np.concatenate([breaks, times])), len(breaks), asked.Phi_V.shape
     K, e = np.zeros((points - 1, len(GAUSS.c), n)), np.zeros((points, 3 * asked.errors))
     tau_qs = driven.quasi_static(times, p_s[points:]).reshape(*K.shape[:2], -1)
-    steps = Steps(asked, breaks, tau_qs, max(float(np.abs(driven.scale * p_s).max()), 1e-300))
+    steps = Steps(asked, breaks, tau_qs, max(float(np.abs(driven.scale * p_s).max()), 1e-12))
     steps.tolerance = within if calm is None else max(within, WHILE_SETTLING)
     if near is None:
         start = Iterate(p_s[:points], np.zeros((points, n)), K, np.zeros((points, m * (asked.order + 1))), e, 1.0)
