@@ -62,7 +62,7 @@ class Observer:
 
     @property
     def radius(self) -> float:
-        """The spectral radius of `error`."""
+        """Spectral radius of `error`: below 1, estimation errors decay from sample to sample."""
         return float(np.abs(np.linalg.eigvals(self.error)).max(initial=0.0))
 
     def towards(self, other: Observer, part: float) -> Observer:

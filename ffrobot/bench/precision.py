@@ -197,7 +197,10 @@ class Settings:
 
 @dataclass(frozen=True)
 class ReferenceRun:
-    """The run against which errors are measured, and an `other` one, whose difference from it is its `error`."""
+    """The run against which errors are measured, and an `other` one, whose difference from it is its `error`.
+
+    `histories`: its motions, forces and torques; `bodies`: hash of each body's modal file, by name.
+    """
 
     integrator: str
     tolerance: float

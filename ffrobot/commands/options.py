@@ -105,7 +105,7 @@ def protect_scene(file: Path, *others: Path | None) -> None:
 
 
 def reading(*files: Path) -> AbstractContextManager[None]:
-    """Context in which files are protected from being overwritten, and errors in reading them mean damage."""
+    """Context that refuses to overwrite `files`, and turns errors in reading them into `InputError` on damage."""
     from ..common import hdf5
 
     return hdf5.reading(*files)

@@ -130,7 +130,8 @@ def receptance(
 ) -> tuple[ComplexArray, ComplexArray]:
     """Return receptances H (F, p), m/N, of the p FRFs of a pose at its F frequencies, and derivatives (n, F, p).
 
-    Derivatives are along n `changes` of `stacked` `equations`.
+    `equations` (3 f + r, f) are M, K, D and J in one array (`stacked`). Derivatives, m/N per unit of a parameter, are
+    those along n `changes`, each the derivative of `equations` by a parameter.
     """
     (M, K, D, J), f, r = unstacked(equations), pose.ends.force, pose.ends.response
     X, w = vibration(M, K, D, J, pose.omega), pose.omega[:, None, None]

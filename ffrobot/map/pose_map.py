@@ -43,7 +43,8 @@ MOST_AXES = 3
 def parse_grid(texts: Sequence[str], scene: Scene) -> tuple[GridAxis, ...]:
     """Return the axes of a grid over joints of `scene`, or over x, y, z of a point and turns of a tool.
 
-    Raises `InputError` for other texts, and for joints and directions that are mixed, unknown, or too many.
+    Each of `texts` is "NAME=FIRST:LAST:COUNT" or "NAME=VALUE,VALUE", in m or rad. Raises `InputError` for other texts,
+    and for joints and directions that are mixed, unknown, or too many.
     """
     axes = tuple(_axis(text, scene) for text in texts)
     names = [axis.name for axis in axes]

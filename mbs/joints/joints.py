@@ -97,7 +97,7 @@ class CylindricalJoint(AxialJoint):
     along = (Along("turn", 2), Along("slide", 2))
 
     def state(self, coordinates: Array) -> Array:
-        """Return q (…, 2): displacement, m, then angle, rad."""
+        """Return q (…, 2): displacement, m, then angle, rad, of `coordinates` (…, 2): angle, then displacement."""
         return coordinates[..., ::-1]
 
     def coordinates(self, q: Array) -> Array:

@@ -39,7 +39,7 @@ class RobotModes:
 
     @property
     def growth(self) -> float:
-        """The largest real part of a pole, 1/s; 0 where it is round-off: the robot falls or is driven to vibrate."""
+        """Largest real part of a pole, 1/s, 0 where it is round-off; above 0 the robot falls or vibrates ever more."""
         largest = float(self.poles.real.max(initial=0.0))
         return largest if largest > self.round_off else 0.0
 

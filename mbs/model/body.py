@@ -53,10 +53,10 @@ class Stiffening:
         return Stiffening(T.T @ self.K_s @ T, T.T @ self.K_x @ T, MappingProxyType(points), T.T @ self.S_turned @ T)
 
     def with_payload(self, point: str, position: Array, phi: Array, mass: float, arm: Array, E: Array) -> Stiffening:
-        """Add a rigid mass (kg) at `arm` (3,), m, from a point; E (3, 3) = ∫ρ ξ ξᵀ dV, kg·m².
+        """Add a rigid payload: `mass`, kg, its center at `arm` (3,), m, from a point; E (3, 3) = ∫ρ ξ ξᵀ dV, kg·m².
 
-        `position` (3,), m, and `phi` = Φ_r (3, n), 1/(m·√kg), are of the point. A place d from it moves by
-        (exp φ~ − 1) d, too: pᵀG p = pᵀK p + pᵀK_r p × d − φ × (φ × d), φ = Φ_r p, with K along and K_r about the axes.
+        ξ is from its center; all are in the link's frame. `position` (3,), m, and `phi` = Φ_r (3, n), 1/(m·√kg), are of
+        the point.
         """
         by_arm = self._by_arm(point, phi)
         G_center = self.at(point)[:3] + np.einsum("lbmn,b->lmn", by_arm, arm)

@@ -198,9 +198,9 @@ class Kinematics:
 
     @classmethod
     def of_points(cls, nodes: Sequence[Node]) -> Kinematics:
-        """Make the kinematics of frames and points of all bodies, and of sections at joints.
+        """Make the kinematics of frames and points of all bodies of a tree, and of sections at joints.
 
-        Massless outputs of rotors have frames in place of sections in the core.
+        `nodes`: its bodies, each with the joint that carries it, from the ground outwards.
         """
         still = [side for node in nodes for side in (node.inner, node.outer) if side.still and side.body >= 0]
         points = [

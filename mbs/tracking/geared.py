@@ -66,9 +66,10 @@ class GearedServo(Servo):
         return M, D, K
 
     def reactions(self, times: Array, p: Array, v: Array, a: Array) -> Array:
-        """Modal forces and motor torques (N, k, n + motors) that moments J N δ̈ of rotors on their carriers require.
+        """Return what a twist δ̈ (rad/s²) of each of k gears requires, per unit of its rotor's I δ̈, at `times` (N,), s.
 
-        Per unit of I δ̈ of each of k gears, at `times` (N,), s.
+        (N, k, n + motors): modal forces and motor torques, by the rotor's moment on its carrier. `p`, `v`, `a` (N, n)
+        are the modal coordinates, m·√kg, and their time derivatives.
         """
         M, shares = super().slopes(times, p, v, a)[0], list[Array]()
         for servo, column in zip(self.without, p.shape[1] + self.gears.columns, strict=True):

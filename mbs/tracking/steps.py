@@ -363,7 +363,10 @@ class Steps:
         return np.concatenate(rows, axis=1), np.concatenate(most, axis=1)
 
     def prices(self, found: Minimum) -> dict[str, Array]:
-        """`Tracked.prices`, by the multipliers of the last program, whose rows are shares of limits."""
+        """Return the decrease of the objective per unit of each limit, by kind of limit: as in `Tracked.prices`.
+
+        `found`: the last program's minimum with its multipliers.
+        """
         prices = {kind: np.zeros(range.shape[1]) for kind, range in self.asked.ranges.items()}
         parts = np.split(found.multipliers.sum(axis=0), np.cumsum([len(limit) for _, limit, _ in self.rows[:-1]]))
         for (kind, limit, owners), multipliers in zip(self.rows, parts, strict=True):
@@ -372,6 +375,6 @@ class Steps:
         return prices
 
     def cost(self, found: Minimum) -> float:
-        """Value J of the effort at `found`, with voltages weighted by `of_voltages`."""
+        """Return the effort J at the minimum `found`: mean squares of torques and voltages in shares; no unit."""
         (H, g, constant), z = self.effort, self.program.z(found.x)
         return float((z * (0.5 * (H @ z[..., None])[..., 0] + g)).sum()) + constant

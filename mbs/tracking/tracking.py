@@ -189,8 +189,9 @@ class TrackedPath(AroundPath):
     objective: Objective  # "least-voltage" in place of that of the scene beyond limits, and if no voltage is needed
     cost: float  # the effort, without unit
     unmet: float  # largest residual modal force between Gauss points, relative to the largest elastic one
-    bounds: Bounds | None  # what each zero requires, V; None where motors alone have no bounded motion
-    prices: Mapping[str, Mapping[str, Array]]  # `Tracked.prices` by kind, then by body, of torques by joint
+    bounds: Bounds | None  # V, by each zero of the zero dynamics; None where motors alone have no bounded motion
+    # decrease of the objective per unit of a limit, by kind of limit, then by body or (torques) joint: `Tracked.prices`
+    prices: Mapping[str, Mapping[str, Array]]
     path_tolerance: float | None  # m, by which coordinates of points may be off their path
     tolerance_price: float | None  # V/m, decrease of the least voltage per path tolerance
     # largest deviation from the path with the same torques but no voltages, m or rad; NaN where not found

@@ -104,7 +104,7 @@ def floats(values: Numbers) -> Array:
 
 
 def axis_of_response(label: str, values: Numbers, limit: float | None = None, sense: Literal[1, -1] = 1) -> DesignAxis:
-    """Return the axis of a response, with room for all its values and its limit."""
+    """Return the axis of a response, with room for all its values and its upper (`sense` 1) or lower (−1) limit."""
     shown = [value for value in (*values, limit) if value is not None] or [0.0]
     low, high = min(shown), max(shown)
     logarithmic = low > 0.0 and high > low * 10.0**DECADES
