@@ -78,7 +78,7 @@ class Unsupplied:
 
 
 def quasi_static_shift(run: Run, modal: Mapping[str, Array], points: Iterable[str]) -> dict[str, Array]:
-    """Return the shift (T, 3), m, global axes, of points by name if `modal` forces F (T, n), N/√kg, by body lack.
+    """Return shifts (T, 3), m, global axes, of points by name if `modal` forces F (T, n), N/√kg, by body are missing.
 
     With motors locked, to first order and quasi-static: δp = −K⁻¹ F.
     """
@@ -90,8 +90,8 @@ def quasi_static_shift(run: Run, modal: Mapping[str, Array], points: Iterable[st
 def freed_shift(run: Run, modal: Mapping[str, Array], point: str, rows: Indices) -> Array:
     """Return the shift (len(rows), 3), m, of a point at outputs `rows` if motors keep their torques: the robot recoils.
 
-    Where `modal` forces (T, n), N/√kg, by body lack: δq = δq_locked + R γ with Rᵀ M δq = 0, R = ∂q/∂γ of motor angles
-    γ, as inner forces do not change momentum.
+    If `modal` forces (T, n), N/√kg, by body are missing, δq = δq_locked + R γ with Rᵀ M δq = 0, R = ∂q/∂γ of motor
+    angles γ, as inner forces do not change momentum.
     """
     shift, R = _locked(run, modal, rows)
     MR = mass_matrices(run.model, run.q[rows]) @ R
@@ -164,7 +164,7 @@ class PatchFeasibility:
         saturation_time: (k,) s, when a limit is first exceeded; NaN where none is.
         slew: (k,) V/s, largest of the required voltage, mean between outputs.
         slew_limit: (k,) V/s.
-        current: (k,) A, largest, mean between outputs.
+        current: (k,) A, largest at the required voltage, mean between outputs.
         current_limit: (k,) A.
         field: (k,) V/m in a layer at the required voltage.
         limited_field: (k,) V/m at the voltage within the limit.
@@ -337,8 +337,8 @@ def judge_actuators(
 ) -> Feasibility:
     """Return the requirements on motors by joint ("JOINT 2" of a second coordinate) and on patches by layout.
 
-    `path` is that of the scene file, `patches` are by link, `voltages` by layout. `others` need no patches, as forces
-    at actuation points act on them.
+    `path` is that of the scene file, `patches` are by link, `voltages` by layout. Links among
+    `others` need no modal forces of patches.
     """
     judged: dict[str, PatchFeasibility] = {}
     for body, of_link in patches.items():

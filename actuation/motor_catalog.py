@@ -43,7 +43,7 @@ class _Catalog(Record):
 
 
 class JointTask(NamedTuple):
-    """Task of a joint over `time` (T,), s: `load` without rotor, N·m or N, rate, rad/s, acceleration (T,), rad/s²."""
+    """Task of a joint over `time`, s: `load` without rotor, N·m or N, rate and acceleration, SI; all (T,)."""
 
     time: Array
     load: Array

@@ -43,7 +43,7 @@ class MotorFeasibility:
     # (kg); NaN where loops share it among joints
     load_inertia: float = np.nan
     jump: str = ""  # "acceleration" or "jerk" of the path if its jump causes a short peak; else ""
-    # largest torque at rest along the path, which a slower path does not reduce; NaN if within limits, or not known
+    # largest torque at rest along the path, which a slower path does not reduce; NaN if within the limit, or not known
     static_moment: float = np.nan
 
     @property

@@ -89,7 +89,7 @@ class PointSet:
         return self.direction, position, np.vstack([point.translation for point in self.points]), self.scale
 
     def L_a(self, p: Array) -> Array:
-        """Return generalized forces (T, 6 + n, c), N·m, N/√kg, of components of 1 N at p (T, n), m·√kg; body axes."""
+        """Return generalized forces (T, 6 + n, c), N, N·m, N/√kg, of 1 N of each at p (T, n), m·√kg; body axes."""
         e, columns = self.direction, []
         for k, point in enumerate(self.points):
             u = point.position + p @ point.translation.T
@@ -210,7 +210,7 @@ class PointForces:
 
 
 def solve_points(chosen: PointSet, run: Run) -> PointForces:
-    """Solve L_a F_a = Q_a for the forces F_a at points of a body by its driving forces Q_a, by least squares."""
+    """Solve L_a F_a = Q_a by least squares: forces F_a at points of a body from its driving forces, at all outputs."""
     node = run.model.tree.nodes[run.model.tree.index[chosen.body]]
     Q_a = find_driving_forces(run)[chosen.body]
     p = run.q[:, node.p_q]

@@ -250,7 +250,7 @@ def _feed_forward(
     *,
     whole: bool = False,
 ) -> Array:
-    """Torques and voltages (K, inputs) that are fed forward, in the middle of each sample's time; `whole`: all."""
+    """Torques and voltages (K, inputs) that are fed forward, in the middle of each command's time; `whole`: all."""
     middle = np.minimum(times + analysis.delay + analysis.sample_time / 2, source.time[-1])
     most = largest_moments(context.model, limits=False)
     values = supplied(source, most, context.patches, limited=not analysis.unlimited).sample(middle.tolist())
@@ -308,7 +308,7 @@ def _followed(
 def _place_of_tip(analysis: ClosedLoop, model: Model, source: Run, tip: str) -> Callable[[Array], Array]:
     """Where the tip should be (T, d), m, at times (T,), s: on its paths, constant before 0 and after their end.
 
-    Without a path where it is in the inverse analysis until all paths end, then the final position.
+    Without a path, where it is in the inverse analysis until all paths end, then the final position.
     """
     paths = [path.components for path in model.scene.trajectory if path.point == tip]
     run, rest = source.closer, commanded_rest(source)

@@ -157,7 +157,7 @@ class ComputedTorqueControl:
 
 
 class PythonControl:
-    """Controller from a user's function `factory` of the setup. Raises `SolveError` where that fails."""
+    """Controller from a user's function `factory`. Raises `SolveError` where that fails, or commands do not fit."""
 
     bandwidth = 0.0
 

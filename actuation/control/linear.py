@@ -127,7 +127,7 @@ class Linear(InstantAnalysis):
 
 
 def with_voltages(model: Model, mechanism: LinearMechanism, patches: Mapping[str, LinkPatches]) -> LinearMechanism:
-    """Return the mechanism with inputs "pzt/LAYOUT/k" after its motors: generalized forces of 1 V."""
+    """Return the mechanism with inputs "pzt/LAYOUT/k" after its motors: generalized forces of 1 V along s."""
     found = {name: column for name, column in mechanism.inputs.items() if name.startswith("joint/")}
     for of_link in patches.values():
         along_s = model.modal_directions(of_link.per_volt) @ mechanism.transformation

@@ -234,7 +234,7 @@ def save_arrays(arrays: Mapping[str, Any], path: Path) -> None:
 
 
 def read_arrays(path: Path, names: Sequence[str]) -> list[Array]:
-    """Read matrices (rows, columns), any unit, of a .npz or .mat file by name. Raises `InputError` where one lacks."""
+    """Read matrices, any unit, of a .npz or .mat file by name. Raises `InputError` if it is unreadable or lacks one."""
     try:
         if path.suffix == ".mat":
             held: Mapping[str, Any] = scipy.io.loadmat(path)
@@ -379,9 +379,9 @@ def zeros(model: LinearModel, inputs: Names, outputs: Names) -> Zeros:
     """Return the zeros from as many inputs as outputs, by name (transmission zeros where more than one).
 
     While C z = 0 the inputs act as constraint forces: with bases N of C z = 0 and N_B of Bᵀ z = 0, zeros are the
-    eigenvalues of N_Bᵀ (λ² I + λ D̂ + K̂) N. Infinite ones of the pencil, which QZ scatters, are those whose distance
-    from infinity is within their round-off (G. W. Stewart and J. Sun, Matrix Perturbation Theory, 1990, VI.2). A
-    transfer that is 0, or singular at all s, has none. Raises `InputError` unless both have the same number.
+    eigenvalues of N_Bᵀ (λ² I + λ D̂ + K̂) N. Infinite ones, which QZ scatters, are those whose distance from infinity
+    is within their round-off (G. W. Stewart and J. Sun, Matrix Perturbation Theory, 1990, VI.2). A transfer
+    that is 0, or singular at all s, has none. Raises `InputError` unless both have the same number.
     """
     K, D, B, C = model.second_order
     b, c = B[:, model.inputs(inputs)], C[model.outputs(outputs)]

@@ -84,7 +84,7 @@ class Loop:
 class AmplifiedLoop:
     """Sampled loop with amplifiers, called at every step: motor commands, and mean voltages behind the amplifiers.
 
-    `directions` (k, n_v): current, A, by the strain of each of k patches, times v; `splits`: begin and end of v in a
+    `directions` (k, n_v) times v: current, A, by the strain of each of k patches; `splits`: begin and end of v in a
     state.
     """
 
@@ -247,7 +247,7 @@ def loop_record(
     loops: Loops,
     lowest: float,
 ) -> LoopRecord:
-    """Return the record of a run under the controllers `acting`; linear `loops` about the reference have its margins.
+    """Return the record of a run under the controllers `acting`; margins are of the linear `loops`.
 
     `lowest`: frequency, Hz, of the robot with joints controlled or locked; NaN if nothing vibrates.
     """

@@ -117,9 +117,8 @@ def lowest_frequency(
 ) -> float:
     """Return the lowest frequency of the robot with controlled or locked joints, Hz; NaN if nothing vibrates.
 
-    It is the lowest with locked motors and, with PID controllers of joints alone, of the sampled loop (sample time T,
-    `delay` of commands, s) with damping ratios below `LIGHTLY`; with other controllers half of the lowest with locked
-    motors.
+    It is the lowest with locked motors and, if PID controllers alone drive joints, of the sampled loop (sample time T,
+    `delay` of commands, s) with damping ratios below `LIGHTLY`. With other controllers it is half of the first.
     """
     locked = min((float(locked_frequencies(model).min(initial=np.inf)) for model in models), default=np.inf)
     pids = [record for record in controllers if isinstance(record, JointPid)]

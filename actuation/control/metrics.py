@@ -184,7 +184,7 @@ def settling(t: Array, distance: Array) -> float:
 
 
 def _last_crossing(t: Array, values: Array, level: float) -> float:
-    """When (s) `values` (T,) last come down to `level`, by a cubic; NaN if they end above it, else the first time."""
+    """When (s) `values` (T,) last come down to `level`, by a cubic; NaN if they end above it, `t[0]` if never."""
     above = np.flatnonzero(values > level)
     if not above.size:
         return float(t[0])
@@ -210,7 +210,7 @@ def last_change(values_at: Callable[[Array], Array], time: Array) -> float:
 def verdict_of(
     run: LoopMotion, cut: Array, asked: tuple[Array, Array], lowest: float, is_stable: bool | None, *, is_seen: bool
 ) -> str:
-    """Return the verdict on linear loop and run, which depends on the motion in the quiet time, when nothing changes.
+    """Return the verdict on linear loop and run; in the quiet time, from `run.quiet` on, nothing changes.
 
     "diverges"; "oscillates at its limits": in the last quarter, in which commands are at limits, vibration does not
     decay, or a command goes from one limit to the other; "grows": vibration from quarter to quarter (of path and rest

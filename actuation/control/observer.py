@@ -1,8 +1,8 @@
 """Observers: estimates of what no sensor reads, by a sampled model of the robot about its reference. SI units.
 
-A Kalman filter has M = 0 and, in its steady state, L = P Cᵀ (C P Cᵀ + R)⁻¹ with P from a Riccati equation (Anderson and
-Moore, Optimal Filtering, 1979, ch. 4); a predictor has L = 0. Commands that wait for their delay, which are known, and
-the filters of sensors are states of the model.
+As an `Observer` a Kalman filter has M = 0 and, in its steady state, L = P Cᵀ (C P Cᵀ + R)⁻¹ with P from a Riccati
+equation (Anderson and Moore, Optimal Filtering, 1979, ch. 4); a predictor has L = 0. States of the model include known
+commands that wait for their delay, and the filters of sensors.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ NAMED = 0.1  # of the largest entry of a vector of states
 class Observer:
     """Matrices of an observer with n states for p readings y: x̂ = x̂⁻ + L (y − C x̂⁻), estimates E x̂; SI units.
 
-    From sample to sample x̂⁻ = A x̂ + B u + M (y − C x̂⁻) with commands u.
+    The next x̂⁻ is A x̂ + B u + M (y − C x̂⁻) with commands u; y and u are deviations from the reference.
     """
 
     A: Array  # (n, n)

@@ -130,7 +130,7 @@ class PatchSignals:
     """The k patches of one link, and the m uncoupled modal coordinates that they excite, the lowest first."""
 
     inputs: tuple[str, ...]  # names of the voltages, and of the readings
-    omega: Array  # (m,) rad/s, natural frequencies of these coordinates
+    omega: Array  # (served,) rad/s, natural frequencies of those that are no attachment modes
     gain: Array  # (k, m) V√kg/N, voltages per force on each of these coordinates
     volts: Array  # (k, m) V/(m·√kg), readings per unit of each coordinate
     own: Array  # (m, n) these coordinates from all n modal coordinates p of the link

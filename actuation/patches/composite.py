@@ -347,7 +347,7 @@ def _stretches(
 
 
 def _outlined(key: str, layout: PztLayout, body: ModalBody, edges: Array) -> Array:
-    """Modal forces (k, n) of unit membrane force (N/m) on faces, outlined ones if none is named, else `InputError`."""
+    """Modal forces (k, n) of unit membrane force, N/m, pressure on +y, tension on −y: mean of the layout's faces."""
     patches = body.surface_patches
     if patches is None:
         raise InputError(

@@ -75,7 +75,7 @@ class LinkPatches:
         return self.bodies[self.body].Phi_V
 
     def voltages(self, F_p: Array) -> dict[str, Voltages]:
-        """Return voltages by layout for modal forces F_p (T, n), N/√kg; `unmet` is what all layouts together lack."""
+        """Return voltages by layout for modal forces F_p (T, n), N/√kg; `unmet` is left by all layouts together."""
         found = solve_voltages(self.reach, self.reach.modes.forces(F_p))
         return self._by_layout(found.required, found.within_limit, F_p)
 
@@ -144,7 +144,7 @@ class LinkPatches:
         return slice(end - len(self.arrays[layout].edges), end)
 
     def unmet(self, F_p: Array, voltages: Array) -> Array:
-        """Return the part (T, n) of modal forces F_p (T, n), N/√kg, that voltages (T, k), V, of all patches lack."""
+        """Return the part (T, n) of modal forces F_p (T, n), N/√kg, that voltages (T, k), V, of all patches leave."""
         left: Array = F_p - voltages @ self.Phi_V.T
         return left if self.on_kept is None else left @ self.on_kept
 
@@ -155,7 +155,7 @@ def driven_patches(placed: Iterable[PlacedLayout | PatchArray]) -> Array:
 
 
 def placed_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody) -> list[PlacedLayout]:
-    """Return layouts with positions of patches, and the default of `strain`: none across wide links and outlined faces.
+    """Return layouts with positions of patches, and `strain`: by default "biaxial" on wide links and outlined faces.
 
     Raises `InputError`, which begins with the scene's `path`, for patches that do not fit the link.
     """

@@ -44,7 +44,7 @@ class ReachedModes:
     served: int
 
     def forces(self, F_p: Array) -> Array:
-        """Return modal forces (T, m), N/√kg, on p' by those (T, n) on the modes of the body."""
+        """Return modal forces (T, m), N/√kg, on p', or other rows linear in modes, by those (T, n) of the body."""
         return F_p[:, self.rows] @ self.T
 
     def coordinates(self, p: Array) -> Array:
@@ -191,7 +191,10 @@ def voltage_scale(patches: Reach) -> Array:
 
 
 def voltage_gain(patches: Reach) -> Array:
-    """Voltages (k, n), V√kg/N, per modal force without limits: Φ_V⁻¹, or of least weighted residual, and then least."""
+    """Voltages (k, n), V√kg/N, per modal force without limits: Φ_V⁻¹, or of least weighted residual.
+
+    Of several solutions it is the smallest relative to `voltage_scale`.
+    """
     (n, k), served = patches.Phi_V.shape, patches.served
     if k == served and patches.serves_all:
         return np.linalg.inv(patches.Phi_V[:served]) @ np.eye(served, n)

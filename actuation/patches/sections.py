@@ -183,7 +183,8 @@ def layer_loads(layout: PztLayout, extent: float, lever: float) -> tuple[Array, 
 
     The link has `extent` t_b (m) along their normal; `lever` is β. Along the strain that they actuate, f of plain
     ceramic on one face is E_p d31 w_p N (t_b + N t_p)/2 N·m/V, the sum of the layers' arms t_b/2 + (i − ½) t_p (one:
-    Eq. 14 of Shabana 2022). Both faces double it; twist has the shear stress of a volt, times β, in place of E_p d31.
+    Eq. 14 of Shabana 2022). Both faces double it; twist has the shear force per width
+    of a volt, times β, in place of E_p d31.
     """
     A, S, I = layer_section(layout, extent)  # noqa: E741
     sign, middle, w = np.sign(S), layout.offset, layout.width
