@@ -41,7 +41,7 @@ def user_function(function: object) -> TimeFunction:
 
 
 def called(function: Callable[..., object], t: float, *arguments: object) -> Array:
-    """Return the numbers (any,), of any unit, of a user's function; its errors get a note with its name and t (s).
+    """Return the numbers, of any shape and unit, of a user's function; its errors get a note with its name and t (s).
 
     Raises `InputError` where it returns something else than numbers.
     """
@@ -63,8 +63,8 @@ def _name_of(function: object) -> str:
 def check_domain(function: TimeFunction, times: Array, describe: str, derivatives: int = 2) -> None:
     """Raise `InputError` unless `function` and its first `derivatives` time derivatives exist at all `times` (T,), s.
 
-    The message starts with `describe` (file and key) and has the first time of a domain error, an overflow, or that
-    the waypoints do not cover.
+    The message starts with `describe` (file and key) and has the first time with a domain error or an overflow, or
+    beyond the waypoints.
     """
     samples = function.sample(np.ascontiguousarray(times, dtype=np.float64))[: derivatives + 1]
     bad = np.flatnonzero(~np.isfinite(samples).all(axis=0))
@@ -87,7 +87,7 @@ def check_domain(function: TimeFunction, times: Array, describe: str, derivative
 INSTANTS = 13  # at which is looked
 STEPS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)  # of differences, relative to the time that the function is needed for
 AGREED = 1e-5  # two differences that differ by less know the derivative; relative to its largest value
-WRONG = 1e-3  # what a derivative may be off by, likewise
+WRONG = 1e-3  # error of a derivative, likewise
 ROUND_OFF = 1e-8  # of the largest value over the time: differences of less are round-off
 GOLDEN = 0.6180339887498949  # its multiples fall on no grid, so on no instant at which accelerations jump
 
@@ -96,8 +96,8 @@ def check_derivatives(function: TimeFunction, end: float, describe: str) -> None
     """Raise `InputError`, starting with `describe`, where rate or acceleration contradict differences before `end` (s).
 
     Differences of value and rate with several steps h count where those with h/2 agree: few or none do beside a jump
-    of the acceleration, or where values are rounded, or vibrate. The function is wrong where all that count
-    contradict it.
+    of the acceleration, or where values are rounded, or vibrate faster than a step. The function is wrong where all
+    that count contradict it.
     """
     times = end * (0.02 + 0.96 * ((GOLDEN * np.arange(1, INSTANTS + 1)) % 1.0))
     given = function.sample(times)

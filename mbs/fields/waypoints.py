@@ -307,7 +307,7 @@ def _read_table(path: Path) -> tuple[list[str], Array, Indices]:
 
 
 def numbers_of(path: Path, line: int, row: list[str], count: int) -> list[float]:
-    """Return the `count` numbers of a row in the file `path`. Raises `InputError` for text, or another count."""
+    """Return the `count` numbers of a row of `path`. Raises `InputError` for text, another count, or too large ones."""
     try:
         numbers = [float(cell) for cell in row]
     except ValueError:

@@ -142,7 +142,7 @@ class LoopEquation(NamedTuple):
 class Along(NamedTuple):
     """A coordinate of a joint that closes a loop; axes 0, 1, 2 of the inner triad, or of the outer one if `of_outer`.
 
-    "slide": displacement along f, m; "turn": angle, rad, about f between the axes g of both triads.
+    "slide": displacement along f, m; "turn": angle, rad, about f from the inner triad's axis g to the outer one's.
     """
 
     kind: Literal["slide", "turn"]
@@ -269,7 +269,7 @@ class JointRecord(Record):
         """Return coordinates (…, k), rad or m, in the scene's order from the core's q (…, q_count); or rates from v."""
         return q
 
-    # What a motor and a gear add; joints that can have them override this.
+    # Joints that can have motors or gears override these.
 
     def has_motor(self, default: bool) -> bool:
         """Whether a motor drives the joint; `default` if the scene does not specify it."""

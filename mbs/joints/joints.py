@@ -266,4 +266,4 @@ AnyJoint = Annotated[
 """All types, by the key `type`: a new one is a record above and an entry here."""
 
 JOINT_TYPES: dict[str, type[JointRecord]] = {record.type_name(): record for record in get_args(get_args(AnyJoint)[0])}
-"""The records by what the key `type` says."""
+"""Records by the key `type`."""

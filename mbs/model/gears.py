@@ -114,7 +114,7 @@ def compliance(node: Node) -> tuple[TwistSpring, float] | None:
 
 
 def resistance(model: Model, q: Array, v: Array) -> Array:
-    """Return friction (T, n_v), N·m or N, in all joints, cut ones too, at q (T, n_q) and v (T, n_v)."""
+    """Return negative forces (T, n_v) of friction in all joints, cut ones too, SI, at q (T, n_q) and v (T, n_v)."""
     return _of_frictions(model.tree, v, Friction.resistance) + model.along_cut.resistance(q, v)
 
 

@@ -130,7 +130,7 @@ def moves(node: Node) -> bool:
 
 
 def rows_of(body: Body, section: Section) -> tuple[Array, Array, list[Array]]:
-    """Return Φ over Φ_r (6, n), 1/√kg, 1/(√kg·m), position (3,), m, of a section, its `Stiffening.K_points` (n, n)."""
+    """Return Φ over Φ_r (6, n), 1/√kg, 1/(√kg·m), position (3,), m, of a section, six K_points (n, n) if any."""
     if not section.point:
         return np.zeros((6, body.n_modes)), np.zeros(3), []
     at = body.points[section.point]
@@ -142,7 +142,7 @@ def rows_of(body: Body, section: Section) -> tuple[Array, Array, list[Array]]:
 
 
 def _data(body: Body, markers: list[Section]) -> _core.SpatialData:
-    """The constants of a body; those of modes are left empty of a rigid one."""
+    """Constants of a body; those of modes are empty of a rigid one."""
     data = _core.SpatialData()
     data.mass, data.first_moment, data.J2 = body.mass, np.array(body.first_moment), np.array(body.second_moment)
     if body.n_modes:

@@ -27,7 +27,7 @@ class Section(NamedTuple):
     still: bool = False
 
     def turned(self, rotation: Array) -> Array:
-        """Return the rotation (…, 3, n), rad, of the triad from that of the section: without z if `still`."""
+        """Return the rotation (…, 3, n), any unit, of the triad from that of the section: without z if `still`."""
         if not self.still:
             return rotation
         z = self.triad[:, 2]
@@ -94,7 +94,7 @@ class ConstraintRow:
 def rows_of_joint(
     owner: str, node: Node, columns: Array, targets: Sequence[TimeFunction | None], sign: float = 1.0
 ) -> list[ConstraintRow]:
-    """Return the equations by which coordinates of a node's joint, `sign` · v[`columns`] (k,), follow k `targets`.
+    """Return equations by which a node's joint coordinates at `columns` (k,) of v, times `sign`, follow k `targets`.
 
     For planar joints, whose axes turn, they are between sections, with `sign` 1.
     """

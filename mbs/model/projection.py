@@ -1,7 +1,7 @@
 """Bodies of planar scenes, projected on the plane z = 0 of their frames; mechanisms that move in a plane.
 
-Displacements of modes across the plane keep their share of m_ff = 1. Masses have affine displacements that keep shapes
-alone: translations along x and y, an expansion (x, y) and a rotation (−y, x). A body gets the integrals of a mass that
+Displacements of modes across the plane keep their share of m_ff = 1. Masses have only affine displacements that keep
+shapes: translations along x and y, an expansion (x, y) and a rotation (−y, x). A body gets the integrals of a mass that
 is as wide along x as along y about its center, which has no others: then geometric stiffening is the same in 3D.
 
 Mechanisms whose joints all turn about the normal of a plane or slide in it, and whose bodies bend in it, are solved in

@@ -31,7 +31,7 @@ class Integrated(NamedTuple):
 class MultibodySystem:
     """A tree with its constraint equations (rows) in the core; states (q, v) are those of the tree. SI units.
 
-    In the core coordinates, targets and multipliers of reversed joints are `ConstraintRow.sign` times the scene's.
+    In the core, coordinates, targets and multipliers of reversed joints are `ConstraintRow.sign` times the scene's.
 
     Attributes:
         model: the model from which it is made.
@@ -115,7 +115,7 @@ class MultibodySystem:
         return _core.Replay(self.replayed.source, zero_order_hold(self.model, self.replayed.commands), at_points)
 
     def multipliers(self, of_core: Array) -> Array:
-        """Return multipliers (T, rows), N or N·m, of the model from those of `integrated`; 0 for omitted equations."""
+        """Return multipliers (T, rows), N, N·m, of the model from those of `integrated`; 0 if omitted or dependent."""
         of_rows = of_core if self.plane is None else of_core @ self.plane.spread.T
         return of_rows * self.model.row_signs
 
@@ -129,7 +129,7 @@ class MultibodySystem:
         return self._wrenches.index(self._markers.place(self.model.tree.section(point)))
 
     def forward_model(self) -> _core.ForwardModel:
-        """Return the model for motions under constant inputs, without loads of the scene or targets."""
+        """Return the model for motions under constant inputs, without loads; it must have no trajectories."""
         return _core.ForwardModel(*self._parts[:-1], self.scene)
 
     def _driven(self, commands: Sequence[Command]) -> Booleans:
@@ -321,9 +321,9 @@ class FrameShare(NamedTuple):
 
 
 def frame_share(model: Model, joint: str, q: Array) -> FrameShare:
-    """Return modal forces −Φ_rᵀ J_l(φ) z per torque of a revolute joint's motor on both sections at q (n_q,).
+    """Return modal forces per torque of a revolute joint's motor on the outer body at q (n_q,): theory.md, Eq. 30.
 
-    z is the axis, φ = Φ_r p, J_l the left Jacobian; see core/recursion/motion/zero_order_hold.h.
+    They are ∓Φ_rᵀ J_l(φ) z of the outer (upper sign) and inner section, z the axis, φ = Φ_r p, J_l the left Jacobian.
     """
     tree = model.tree
     direction, slope = np.zeros(tree.n_v), np.zeros((tree.n_v, tree.n_v))

@@ -160,7 +160,7 @@ class KinematicTree:
         return is_joint
 
     def at_rest(self, guesses: Mapping[str, Array]) -> Array:
-        """Return q (n_q,) of undeformed links, with joint coordinates `guesses` by name, rad or m, else 0."""
+        """Return q (n_q,) of undeformed links; joints have `guesses` by name in the scene's order, rad or m, else 0."""
         q = np.zeros(self.n_q)
         for node in self.nodes:
             numbers = len(node.joint.guess_units or node.joint.units)
@@ -207,12 +207,12 @@ class CutCoordinate(NamedTuple):
     guess: float  # of its first value, from [initial], else 0
 
     def resistance(self, rate: Array) -> Array:
-        """Return friction (T,), N·m or N, at the coordinate's rate (T,), rad/s or m/s."""
+        """Return the negative friction (T,), N·m or N, at the coordinate's rate (T,), rad/s or m/s."""
         return np.zeros_like(rate) if self.friction is None else self.friction.resistance(rate)
 
 
 def with_auxiliary_rotors(tree: KinematicTree) -> tuple[KinematicTree, list[ConstraintRow]]:
-    """Return the tree with outputs of rotors on first sides of cut joints, and equations: they move as the joints."""
+    """Return the tree with outputs of rotors on first sides of cut joints, and equations by which they follow these."""
     cut = [joint for joint in tree.loops if getattr(joint, "rotor_inertia", 0.0)]
     rows = [cut_row(tree, joint) for joint in cut]
     longer = tree.with_outputs([(joint, f"{joint.name}/rotor", row.a) for joint, row in zip(cut, rows, strict=True)])
@@ -232,7 +232,7 @@ def cut_coordinates(scene: MechanismScene, tree: KinematicTree) -> Iterator[CutC
 
 
 def cut_row(tree: KinematicTree, joint: JointRecord, number: int = 0) -> ConstraintRow:
-    """Return the equation that measures coordinate `number`, times its `sign`, of a cut joint."""
+    """Return the equation that measures its `sign` times coordinate `number` of a cut joint, second side on first."""
     along = joint.along[number]
     sides = tree.sides(joint)
     if joint.name in tree.on_frames:
@@ -294,7 +294,7 @@ class AlongCut:
         return self._kinematics.values(q, np.zeros(len(q)))
 
     def resistance(self, q: Array, v: Array) -> Array:
-        """Return generalized forces (T, n_v), N, N·m, N/√kg, by which friction resists at q (T, n_q), v (T, n_v)."""
+        """Return negative generalized forces (T, n_v), N, N·m, N/√kg, of friction at q (T, n_q), v (T, n_v)."""
         force = np.zeros_like(v)
         gradients = self.measured(q)[1] if self._rough else force
         for k in self._rough:

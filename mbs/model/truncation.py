@@ -51,7 +51,6 @@ def with_fewer_modes(body: Body, lowest: int, loaded: Sequence[str]) -> Body:
     T = np.hstack([np.eye(body.n_modes)[:, kept], *shapes])
     reduced = bodies.transformed(body, T, stiffness)
     static_shapes = len(stiffness) - lowest if body.attachment_modes else 0
-    # Modal forces on all modes from those on the coordinates, exact for forces of the loads Bᵀ
     lift = T + (B_T - T @ (T.T @ B_T)) @ np.linalg.pinv(T.T @ B_T)
     reduction = bodies.Reduction(body, lowest, T, lift)
     return replace(reduced, reduction=reduction, attachment_modes=static_shapes)

@@ -53,7 +53,7 @@ class Analysis(Referring):
 
     follows_trajectories: ClassVar[bool] = True  # whether trajectories must have values at all its `times`
     starts_on_path: ClassVar[bool] = False  # whether it uses the `path` of its context
-    is_motion: ClassVar[bool] = True  # whether it finds a motion, at instants of which other analyses may start
+    is_motion: ClassVar[bool] = True  # whether it finds a motion; others may be about its instants
     is_integrated: ClassVar[bool] = False  # whether this motion comes from an integration over time
     is_algebraic: ClassVar[bool] = False  # whether each output is solved for by itself
     is_resumable: ClassVar[bool] = False  # whether a stopped run can be continued, under the same tolerance
@@ -162,7 +162,7 @@ class TimedAnalysis(Analysis):
 
     @property
     def times(self) -> Array:
-        """Output times (T,), in s: exact multiples of the output step; `end` is one of them, exactly."""
+        """Output times (T,), s: multiples of `output_step`; `end` exactly."""
         return output_times(self.end, self.output_step)
 
     @property
@@ -272,7 +272,7 @@ class ActuatedAnalysis(IntegratedAnalysis):
 
 
 def output_times(end: float, step: float, before: float = 0.0, after: float = 0.0) -> Array:
-    """Return output times (T,), s: multiples of `step` from −`before` to `end` + `after`, all s; `end` exactly."""
+    """Return output times (T,), s: multiples of `step` from −`before` to `end` + `after`; `end` exactly."""
     if not (end and step):
         return np.zeros(1)
     early, late, count = (round(x / step) for x in (before, after, end))

@@ -71,7 +71,7 @@ class Initial(Referring):
         return self._named.get(table, frozenset(getattr(self, table)))
 
     def naming(self, **named: frozenset[str]) -> Self:
-        """Return a copy of which `named(table)` has the joints given for each table, though others have values, too."""
+        """Return a copy with these joints as `named(table)` of each table, even if other joints have values, too."""
         copy = self.model_copy()
         copy._named = named
         return copy
@@ -238,7 +238,7 @@ def _turns(joint: JointRecord) -> bool:
 
 
 def _turn(of_bodies: Values, joint: JointRecord) -> float:
-    """Of the second body against the first, by absolute angles or rates."""
+    """Second body against the first, by absolute angles or rates."""
     first, second = (0.0 if body == GROUND else of_bodies.get(body, 0.0) for body in joint.bodies)
     return second - first
 

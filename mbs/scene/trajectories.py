@@ -311,7 +311,7 @@ class Trajectory(Referring):
 
     @cached_property
     def stopping(self) -> Piecewise | None:
-        """Return `path` with a stop at each waypoint; None if it already stops there."""
+        """`path` with a stop at each waypoint; None if it already stops there."""
         return self.model_copy(update={"blend": 0.0})._through(self._places[:, :3]) if self.blend else None
 
     @cached_property
@@ -362,7 +362,7 @@ class Trajectory(Referring):
 
     @cached_property
     def _turns(self) -> tuple[Array, Reference] | None:
-        """Orientations of a table or of poses, rotation vectors (k, 3) about their middle; and it."""
+        """Rotation vectors (k, 3), rad, of a table or poses from their mean orientation, and that of the mean."""
         if self.waypoints is not None and QUATERNION[0] in self.waypoints.columns:
             return orientation_of(self.waypoints)
         if not self._has_poses:
