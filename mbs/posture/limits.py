@@ -16,7 +16,7 @@ from ..model.model import Model
 from ..model.nodes import Node
 from ..model.tree import KinematicTree
 
-ROUND_OFF = 1e-12  # of the largest value of a coordinate
+ROUND_OFF = 1e-12  # rad or m
 
 Seen = tuple[float, float, float | None]
 """Least and largest value, and when the range was left first, s."""
@@ -58,7 +58,8 @@ def watched(tree: KinematicTree) -> list[Watched]:
 def watch_limits(scene: _core.TreeScene, tree: KinematicTree) -> None:
     """Have the core watch coordinates with limits (`watched`) while it integrates `scene`."""
     for one in watched(tree):
-        scene.add_limit(one.v, *one.limits)
+        lowest, highest = one.limits
+        scene.add_limit(one.v, lowest - ROUND_OFF, highest + ROUND_OFF)
 
 
 def left_ranges(model: Model, ranges: Sequence[Seen] | None, times: Array, q: Array, v: Array) -> Iterator[str]:
@@ -70,8 +71,8 @@ def left_ranges(model: Model, ranges: Sequence[Seen] | None, times: Array, q: Ar
     of_core = zip(watched(model.tree), ranges, strict=True) if ranges is not None else ()
     seen = [(one.joint, one.number, one.seen(values)) for one, values in of_core]
     for joint, number, values in limited_coordinates(model, times, q, v, every=ranges is None):
-        (lowest, highest), round_off = joint.position_limits[number], ROUND_OFF * np.abs(values).max()
-        outside = times[(values < lowest - round_off) | (values > highest + round_off)]
+        lowest, highest = joint.position_limits[number]
+        outside = times[(values < lowest - ROUND_OFF) | (values > highest + ROUND_OFF)]
         seen.append((joint, number, (values.min(), values.max(), outside[0] if outside.size else None)))
     for joint, number, (least, largest, left_at) in seen:
         (lowest, highest), unit = joint.position_limits[number], joint.units[number]

@@ -16,7 +16,7 @@ from ..fields.waypoints import spline
 from ..model.build import row_of_joint
 from ..model.model import Model
 from ..model.nodes import ConstraintRow
-from .limits import limited_coordinates
+from .limits import ROUND_OFF, limited_coordinates
 from .start import are_regular, random_angles, turning_joints, undeformed_posture
 
 TURN = "turn"  # axis of a grid: of the body of the point about an axis of it
@@ -189,5 +189,5 @@ def within_limits(model: Model, q: Array) -> Booleans:
     within, v = np.ones(len(q), dtype=bool), np.zeros((len(q), model.tree.n_v))
     for joint, number, values in limited_coordinates(model, np.zeros(len(q)), q, v, every=True):
         lowest, highest = joint.position_limits[number]
-        within &= (values >= lowest) & (values <= highest)
+        within &= (values >= lowest - ROUND_OFF) & (values <= highest + ROUND_OFF)
     return within

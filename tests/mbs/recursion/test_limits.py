@@ -110,6 +110,8 @@ def test_under_a_sampled_controller():
 def test_a_range_that_is_left_at_the_start_and_one_that_is_kept():
     system, start = pendulum([-3.0, 1.0])
     assert seen(system, run(system, start, [0.0, 0.1], controls()))["pin", 0][1:] == (START, 0.0)
+    system, start = pendulum([-3.0, START - 1e-13])  # round-off of a start at the limit
+    assert seen(system, run(system, start, [0.0, 0.1], controls()))["pin", 0][2] is None
     system, start = pendulum([-1.0, 2.0])
     kept = seen(system, run(system, start, [0.0, 0.99 * time_at(-1.0)], controls()))["pin", 0]
     assert kept[2] is None
