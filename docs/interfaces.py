@@ -53,7 +53,7 @@ PYTHON = """# Python
 <!-- written by docs/interfaces.py from the program -->
 
 This page lists the public names of the package `ffrobot`; [Vary a design in Python](../howto/python.md) uses them.
-`import ffrobot` takes a few milliseconds: modules are loaded when they are needed.
+`import ffrobot` takes a few milliseconds: modules are loaded when needed. `ffrobot.__version__` is its version.
 """
 
 
