@@ -52,7 +52,7 @@ def _warn(place: Path, problem: str) -> None:
 
 @cache
 def own_folder(*names: str) -> Path:
-    """Return a temporary folder, named after `names`, which is deleted when this process ends."""
+    """Return the temporary folder for `names` of this process, which is deleted when that ends."""
     own = tempfile.mkdtemp(prefix=f"ffrobot-{'-'.join(names[:1])}-")
     atexit.register(shutil.rmtree, own, ignore_errors=True)
     return Path(own)

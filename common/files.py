@@ -22,10 +22,9 @@ def write_atomically(
 ) -> None:
     """Write `content` to a temporary name in the same folder, then rename it to `path`.
 
-    HDF5 files are handed over as images made in memory: a full disk then is an ordinary failed write, which HDF5
-    itself does not survive. Raises `SolveError` with the file, `what` it is, and the reason; `InputError` where an
-    input of the command (see `outputs.protected`) would be lost, or a file of another kind. `ours`: any kind may be
-    replaced, as in the cache. `private` files are for this user alone.
+    HDF5 files come as images made in memory: HDF5 itself does not survive a full disk. Raises `SolveError` with the
+    file, `what` it is, and the reason; `InputError` where an input of the command (see `outputs.protected`) would be
+    lost, or a file of another kind. `ours`: any kind may be replaced, as in the cache. `private`: for this user alone.
     """
     check_not_an_input(path)
     if not ours:

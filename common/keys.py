@@ -17,7 +17,7 @@ _UNSEEN = ("Cc", "Cs", "Co", "Cn", "Zl", "Zp")  # control characters, line break
 
 
 def check_title(value: str, most: int = LONGEST_NAME) -> str:
-    """Return `value`. Raises `ValueError` if it is empty, longer than `most`, or has control characters."""
+    """Return `value`. Raises `ValueError` if empty, longer than `most`, or with line breaks or control characters."""
     if not value.strip():
         raise ValueError(f'expected text that is not empty, found "{shown(value)}"')
     if len(value) > most:

@@ -80,7 +80,7 @@ def _is_formula(cell: object) -> bool:
 
 
 def key_path(loc: Sequence[int | str], data: dict[str, Any], kind: str = "missing") -> str:
-    """Place of a key in `data` for messages: `body "link1": rigid.mass` for ("body", 0, "rigid", "mass")."""
+    """Name for messages, `body "link1": rigid.mass`, of ("body", 0, "rigid", "mass"): of the parts in `data`."""
     path = ""
     here: Any = data
     for k, part in enumerate(loc):
@@ -95,7 +95,7 @@ def key_path(loc: Sequence[int | str], data: dict[str, Any], kind: str = "missin
 
 
 def shown(text: str) -> str:
-    """`text` for one line of a message: at most 60 characters, control characters and line breaks escaped."""
+    """`text` for one line of a message: at most 60 of its characters; control characters and line breaks escaped."""
     text = text if len(text) <= 60 else text[:59] + "…"
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 

@@ -23,7 +23,7 @@ TOO_DEEP = re.compile(rf"^[ \t\[]*(?:[\w-]+[ \t]*\.[ \t]*){{{2 * DEEPEST}}}", re
 
 
 def read_text(path: Path, kind: str) -> str:
-    """Read the UTF-8 text of the file at `path`. Raises `InputError`, whose message calls the file `kind`."""
+    """Read UTF-8 text, with or without byte order mark, at `path`. Raises `InputError`, which calls the file `kind`."""
     try:
         text = read_bytes(path, kind).decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -73,7 +73,7 @@ R = TypeVar("R", bound=Record)
 
 
 def existing_file(path: Path, info: ValidationInfo) -> Path:
-    """Return `path`, relative to the folder of the input file. Raises `ValueError` where there is no such file."""
+    """Return `path` as found from the folder of the input file. Raises `ValueError` where there is no such file."""
     folder: Path = (info.context or {}).get("folder", Path())
     resolved, name = folder / path, shown(str(path))
     try:

@@ -11,7 +11,7 @@ VERSION = "0.2.0"
 
 @cache
 def digest_of_code(folder: Path) -> str:
-    """SHA-256 of the Python files below `folder`, which tells results of another state of the program."""
+    """SHA-256 of the Python files below `folder`, to recognize results of another state of the program."""
     digest = hashlib.sha256()
     for file in sorted(folder.rglob("*.py")):
         digest.update(f"{file.relative_to(folder).as_posix()}\0".encode() + file.read_bytes() + b"\0")
