@@ -189,7 +189,7 @@ class Scope:
 
     `frame` is that of *SYSTEM, `place` where an instance is in the assembly. `nodes` are coordinates in the unit of
     the deck; elements are `solids` (type, nodes), `surfaces` (corners), `others` (types of all but solids), `masses`
-    (nodes of type MASS). `nsets`, `elsets` are sets of nodes and elements, `faces` the keywords *SURFACE by name.
+    (the node of each of type MASS). `nsets`, `elsets` are sets of nodes and elements, `faces` *SURFACE by name.
     """
 
     frame: Frame = GLOBAL

@@ -51,7 +51,7 @@ def check_count(count: float, given: str, hint: str = "") -> None:
 
 
 def check_shape(part: PartMesh, geometry: SolidGeometry) -> None:
-    """Raise `InputError` for a part without thickness, or of a length so wrong that the unit must be."""
+    """Raise `InputError` for a part (link's frame) without thickness, or of a length by which its unit is wrong."""
     extent = np.ptp(part.points[part.corners.ravel()], axis=0)
     if extent.min() <= 1e-9 * extent.max():
         axis = "xyz"[int(np.argmin(extent))]

@@ -30,7 +30,7 @@ DEEPEST = 20
 
 
 class Line(NamedTuple):
-    """A line of a deck: its `text` without the line end, and its `place` for messages, "FILE, line 12"."""
+    """A line of a deck: its `text` without the line end, and its `place` for messages, "line 12" or "FILE, line 12"."""
 
     text: str
     place: str

@@ -31,7 +31,7 @@ _is_apart = False  # whether this is such a process
 
 
 def read_apart(read: Callable[..., Found], file: Path, *arguments: object) -> Found:
-    """Call `read(file, *arguments)` in a separate process; `read` is of a module, arguments and result pickle.
+    """Call `read(file, *arguments)`, a module's function, in another process; arguments and result are pickled.
 
     The time allowed grows with the size of the file. Raises `InputError` where `read` has raised it, or its process has
     crashed, or has not ended in the processor time allowed.

@@ -172,7 +172,7 @@ class PlaceRecord(Record):
 
 
 class SurfacePatches(Record):
-    """Piezoelectric patches outlined in the mesh of a solid, on the faces at its largest or smallest y.
+    """Piezoelectric patches outlined in the mesh of a solid.
 
     Keys are as in a scene's `[[pzt]]`: centers at (k − ½)·length of link / count, k = 1 … count, or `centers`.
     """

@@ -20,7 +20,7 @@ READ = (".3mf", ".dae", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
 
 
 def loaded_skin(path: Path, scale: Sequence[float], d: Array, C: Array) -> trimesh.Trimesh:
-    """Read the mesh in `path`, its unit `scale` (3,), m, along each axis, turned by C (3, 3) and moved by d (3,), m.
+    """Read the mesh in `path`; coordinates times `scale` (3,) are m, then turned by C (3, 3) and moved by d (3,), m.
 
     Raises `ModuleNotFoundError` without trimesh, `InputError` if the file is missing, damaged or of another format.
     """
