@@ -2,8 +2,8 @@
 
 The families of a straight beam with principal axes y and z do not couple. All six fields (displacement and rotation of
 the cross section) are continuous piecewise cubics, which values at cubic Lagrange points determine. dolfinx assembles K
-and M from weak forms ∫ weight u⁽ⁱ⁾ v⁽ʲ⁾ dx in UFL: a link needs three, with shear six, whatever its families are.
-Strains at Gauss points, which integrate products exactly, are the root of K: K = BᵀB but for round-off. Loads dolfinx.
+and M from weak forms ∫ weight u⁽ⁱ⁾ v⁽ʲ⁾ dx in UFL: a link needs three, with shear six. Strains at Gauss points, which
+integrate products exactly, are the root of K: K = BᵀB but for round-off. Loads dolfinx.
 """
 
 from __future__ import annotations

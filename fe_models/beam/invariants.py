@@ -76,7 +76,7 @@ def shape_integrals(link: BeamLink, stations: Functions, fields: Array) -> Invar
 
 
 def weighted(link: BeamLink, stations: Functions, moment: str) -> sp.csr_matrix:
-    """Return the matrix (k, k), SI units, of ∫ρ·moment·a b dx for fields a, b at k stations; `moment`: of `Section`."""
+    """Matrix (k, k), SI units, of ∫ρ·moment·a b dx for fields a, b at k stations; `moment`: a name in `Section`."""
     return gram(stations.root(link.material.density * cellwise(link, stations.nodes, moment)))
 
 
@@ -153,7 +153,7 @@ def _lever(force: Array) -> Array:
 
 
 def of_tip_support(link: BeamLink, x: Array, at_root: Array) -> Array:
-    """Force, N, and moment, N·m (6, …, g), at x (g,), m, of a tip support that balances moments `at_root`."""
+    """Force, N, and moment, N·m (6, …, g), at x (g,), m, of a tip support against moments `at_root` (6, …, 1 or g)."""
     L, none = link.geometry.length, np.zeros_like(at_root[0])
     return of_load(np.stack([none, -at_root[5] / L, at_root[4] / L, none, none, none]), L - x)
 

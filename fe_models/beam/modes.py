@@ -64,8 +64,8 @@ def attachment_modes(
 ) -> list[Mode]:
     """Attachment modes of a family, M-orthogonal to its eigenmodes X (m, n) in the modal body.
 
-    `places` are the stations of the interfaces, `length` (m) is that of the link: loads are a unit force, and a moment
-    of that times length. `twists_along`: whether a torque distributed along the link, as on bent links, is a load, too.
+    `places` are the stations of the interfaces, `length` (m) is that of the link: loads are unit forces, and moments
+    of 1 N times it. `twists_along`: whether to add a torque distributed along the link, as on bent links.
     """
     units = [1.0 if row < R_X else length for row in model.fields] * len(places)
     loads = [size * load for size, load in zip(units, model.motion(places), strict=True)]

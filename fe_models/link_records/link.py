@@ -119,8 +119,8 @@ class Modes(Record):
     """The lowest `count` eigenmodes of one or several families, or those numbered `indices` (1 is the lowest)."""
 
     count: ModeCount | None = None
-    """Number of the lowest eigenmodes; alternative: `indices`. Default: six of each bending family, one axial, one of
-    torsion."""
+    """Number of the lowest eigenmodes; alternative: `indices`. Default with `attachment_modes`: six of each bending
+    family, one axial, one of torsion."""
     indices: Annotated[tuple[ModeCount, ...], Field(min_length=1, max_length=MOST_MODES)] | None = None
     """Numbers of the eigenmodes, 1 the lowest."""
     family: Annotated[tuple[Family, ...], Field(min_length=1)] | Family | Literal["all"] = "all"

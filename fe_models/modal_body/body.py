@@ -81,7 +81,7 @@ class ModalBody(Integrals, Frozen):
         modes_hash: of that part of it on which the modes depend; empty where not known.
         ffrobot_version: that made it.
         assembly: program that assembled the matrices, with versions; empty where not known.
-        eigensolver: that of the modes, likewise.
+        eigensolver: program that found the modes, likewise.
         remarks: omitted content of the part's file, one sentence each.
 
     Raises:

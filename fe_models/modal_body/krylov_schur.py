@@ -2,8 +2,8 @@
 
 PETSc sees the flexibility as the preconditioner of an exact solve, and the mass as a matrix that only multiplies. Modes
 found before are deflated: a search goes on where it ended, and one for what is left tells whether one of several alike
-is missing, which no single Krylov space shows. SLEPc solves for one vector at a time, block Lanczos (docs/theory.md,
-Finite elements of a link) for several, which reads the factors of a large solid once.
+is missing, which no single Krylov space shows. SLEPc solves for one vector at a time, block Lanczos (docs/theory.md)
+for several, which reads the factors of a large solid once.
 """
 
 from __future__ import annotations

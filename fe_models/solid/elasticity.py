@@ -63,7 +63,7 @@ class ScalarMass:
 
 @struct
 class SolidModel:
-    """Nodes (`owned`: of this rank), materials and matrices of a solid without supports."""
+    """Nodes, materials and matrices of a solid without supports."""
 
     mesh: Mesh  # distributed over `comm`
     order: int  # polynomial order of the displacements

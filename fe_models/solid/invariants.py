@@ -75,7 +75,7 @@ def prestressed(
 
     It belongs to centers and rotation vectors of the interfaces. `loads` and `shapes` (3 owned, l) are nodal forces,
     N, and displacements, m, of the unit loads, `rows` B (6, 3 owned) the mean motion of each interface, whose transpose
-    spreads loads on it. `supports`: fixed components of the mean motion by interface, in the order of `flexibility.B`.
+    spreads loads on it. `supports`: fixed components by interface, in the order of `flexibility.B`; empty without B.
     """
     total = geometric_stiffness(flexibility.model, modes, shapes)
     T = _of_spread_loads(flexibility, loads, rows, interfaces, supports)

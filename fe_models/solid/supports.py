@@ -1,4 +1,4 @@
-"""How a solid is fixed, and its flexibility F: the displacements u = F f under loads f, with the supports in place.
+"""Supports of a solid, and its flexibility F under these: displacements u = F f by loads f.
 
     F = P (K_0⁻¹ + W S⁻¹ Wᵀ) Pᵀ,   S = WᵀKW,   P = I − R (B R)⁻¹ B
 
@@ -150,7 +150,7 @@ class Flexibility:
 
     def __init__(self, model: SolidModel, faces: Sequence[RigidFace], B: Array | None) -> None:
         self.model, self.faces = model, faces
-        # Translations along, and rotations about, the axes through the origin, of all nodes.
+        # Rigid motions of all nodes, about the origin.
         self.R = _plate(model.x, np.zeros(3)).reshape(-1, 6)
         self.B = B
         clamped = np.zeros((model.owned, 3), dtype=bool)
