@@ -49,7 +49,7 @@ class Modes:
 
     Attributes:
         omega, ratio: (m,) rad/s, and damping ratios.
-        driven: (m, n) modal acceleration, by its size at the point, per unit of each motor's, m/s² by rad/s² or m/s².
+        driven: (m, n) acceleration of each mode, its size at the point, by that of each motor; m/s² by rad/s² or m/s².
     """
 
     omega: Array
@@ -75,7 +75,7 @@ class Ride:
         settling: of the point, by its distance from its final place since the last set point; its residual is that of
             the first period of the lowest vibration once the controllers have settled. None without a place of rest.
         times, off: (T,) s, and distance of the point from its final place, m.
-        postures: (`INSTANTS`, n_q) coordinates, rad and m, evenly along the motion; the last one is that of rest.
+        postures: (`INSTANTS`, n_q) coordinates, rad and m, evenly up to the last set point; the last is that of rest.
         torque: (n,) largest of each motor, N·m or N.
         sag: (2, n) by which joints are off their set points at rest, at the start and at the end, rad or m.
     """
@@ -91,7 +91,7 @@ class Ride:
 class Robot:
     """A scene's robot, whose joints with motors, in the scene's order, follow set points by the controllers `servo`.
 
-    `point` "BODY.POINT" is where vibration counts (None: the tool), `tolerance`, m, that of its final place.
+    `point` "BODY.POINT" is where vibration counts (None: `default_point`), `tolerance`, m, that of its final place.
     """
 
     def __init__(self, scene: Scene, servo: Servo, point: str | None, tolerance: float, watcher: Watcher) -> None:

@@ -58,8 +58,8 @@ class Axis:
 def axis_of(servo: float | str, ratio: float) -> Axis:
     """Axis of `servo`: a natural frequency (Hz) of damping `ratio`, "NUMERATOR / DENOMINATOR", or a CSV table.
 
-    Behind the denominator, whose numbers have blanks between them, "/ DELAY" (s) may follow. The table has measured
-    values: frequency (Hz), magnitude, phase (degrees).
+    A frequency stands for ω²/(s² + 2ζω s + ω²). Behind the denominator, whose numbers have blanks between them,
+    "/ DELAY" (s) may follow. The table has measured values: frequency (Hz), magnitude, phase (degrees).
 
     Raises `InputError` for an axis that is not stable, does not come to its command, or follows jumps of its rate.
     """
@@ -163,7 +163,7 @@ class Servo:
         return max(axis.delay + _decay(axis.poles) for axis in self.axes)
 
     def motors(self, times: Array, command: Array) -> Piecewise:
-        """Return paths of n motors from rest, under set points (T, n), rad or m, at `times` (T,), s, until `settled`.
+        """Paths of n motors from rest by set points (T, n), rad or m, at `times` (T,), s, then for `settled` s or more.
 
         Each line of the command is exact: a change of its slope by Δ adds Δ (t − Σρ + Σρ e^(λt)), with the residues ρ
         of G/s² at the poles λ of G.

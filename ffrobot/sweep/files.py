@@ -123,7 +123,7 @@ class RunFiles:
 def run_files(scene_path: Path, changes: Mapping[tuple[str, ...], Value], folder: Path) -> RunFiles:
     """Return the scene at `scene_path` with `changes` by key, and link files that these change, for `folder`.
 
-    Raises `InputError` for a key in a table or list entry that does not exist.
+    Raises `InputError` for a body without link file, a missing list entry, and a key below a plain value.
     """
     scene, links = _read(scene_path, "scene file"), dict[str, Table]()
     for key, value in changes.items():
@@ -143,7 +143,7 @@ def run_files(scene_path: Path, changes: Mapping[tuple[str, ...], Value], folder
 def value_at(scene_path: Path, key: tuple[str, ...], option: str) -> Value:
     """Return the value of `key` in the scene, or in a link file for `links.BODY.…`; None if absent.
 
-    Raises `InputError`, with the `option` of the command that names the key, for a missing body or list entry.
+    Raises `InputError`, with the `option` of the command, for a body without link file and a missing list entry.
     """
     return value_of(*_place(scene_path, _read(scene_path, "scene file"), key, {}, option), key, option)
 

@@ -86,7 +86,7 @@ class Row:
         return not self.wanted or (bool(wanted) and set(wanted) <= set(self.wanted))
 
     def changes(self, inputs: Mapping[str, str]) -> list[str]:
-        """Return names of files in `inputs`, or imported, that have changed since the run; see `run.inputs.changed`."""
+        """Return names of files, or `PROGRAM`, changed since the run, by `inputs` of now; see `run.inputs.changed`."""
         return changed(self.inputs, {**inputs, **{name: digest_of_file(Path(name)) for name in self.imported}})
 
 

@@ -195,7 +195,7 @@ def _files(sweep: Sweep, run: SweepRun) -> RunFiles:
 def check_point(sweep: Sweep, values: tuple[Value, ...]) -> None:
     """Raise `InputError`, before any run, if the scene or a link file is invalid with these values.
 
-    Values that depend on modal bodies are not checked.
+    Errors that show with modal bodies or results are not found.
     """
     from ..fe_models.link_file import read_link
     from ..scene.load import load_scene
