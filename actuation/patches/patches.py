@@ -258,7 +258,8 @@ class PatchArray(Reach):
     def stiffness_in_words(self) -> str:
         """Text with ψ and the authority, and on whether the equations have the stiffness of the patches."""
         if not np.isfinite(self.authority).all():
-            return f"{self.layout.label}: stiffness ratio ψ not known: the modal body has no rigidities"
+            unknown = "stiffness ratio ψ not known: the modal body has no rigidities"
+            return f"{self.layout.label}: {unknown}; with few modes patches stiffen the link too little"
         spans = [dict.fromkeys(f"{value:.3g}" for value in (of.min(), of.max())) for of in self._stiffness]
         psi, authority = (" … ".join(span) for span in spans)
         felt = "included in the model" if self.layout.adds_stiffness else "not included (structural = false)"
