@@ -119,9 +119,9 @@ class Friction:
         """Return c γ̇ + τ_c tanh(γ̇/γ̇_s), N·m or N, at rates γ̇ (…,), rad/s or m/s."""
         return self.viscous * rate + self.coulomb * np.tanh(rate / self.speed)
 
-    def slope(self, rate: Array) -> Array:
-        """Return c + τ_c/γ̇_s / cosh²(γ̇/γ̇_s), N·m·s/rad or N·s/m, at rates γ̇ (…,), rad/s or m/s."""
-        return self.viscous + self.coulomb / self.speed * (1.0 - np.tanh(rate / self.speed) ** 2)
+    def damping(self, *, is_at_rest: bool) -> float:
+        """Return c, at rest c + τ_c/γ̇_s, N·m·s/rad or N·s/m."""
+        return self.viscous + is_at_rest * self.coulomb / self.speed
 
 
 RecordType = type[Record]  # `type` is a key below

@@ -10,7 +10,7 @@ import numpy as np
 from ...common.arrays import Array, null_space
 from ...common.errors import InputError, quoted
 from ...common.structs import struct
-from ..model.gears import with_prescribed_motors
+from ..model.gears import friction_damping, with_prescribed_motors
 from ..model.known_motion import State, mass_matrices
 from ..model.model import Model
 from ..model.tree import KinematicTree
@@ -46,11 +46,9 @@ def vibrations_of(model: Model, t: float, q: Array) -> Vibrations:
     for node in model.tree.nodes:
         K[node.p_v, node.p_v] = np.diag(node.body.stiffness)
         D[node.p_v, node.p_v] = node.body.damping
-        for column, friction in zip(range(node.v.start, node.v.stop), node.joint.frictions, strict=False):
-            D[column, column] += friction.viscous
     squares, shape = elastic_shapes((M + M.T) / 2, K * both, C_v)
     omega, shape = np.sqrt(squares), sizes[:, None] * shape
-    ratio = np.einsum("in,ij,jn->n", shape, D + model.along_cut.damping(q), shape) / (2 * omega)
+    ratio = np.einsum("in,ij,jn->n", shape, D + friction_damping(model, q), shape) / (2 * omega)
     return Vibrations(omega, ratio, shape, K)
 
 

@@ -3,7 +3,7 @@
 Motors behind compliant gears are coordinates of their own, with springs to those of the joints.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -115,17 +115,20 @@ def compliance(node: Node) -> tuple[TwistSpring, float] | None:
 
 def resistance(model: Model, q: Array, v: Array) -> Array:
     """Return negative forces (T, n_v) of friction in all joints, cut ones too, SI, at q (T, n_q) and v (T, n_v)."""
-    return _of_frictions(model.tree, v, Friction.resistance) + model.along_cut.resistance(q, v)
-
-
-def tree_resistance_slope(tree: KinematicTree, v: Array) -> Array:
-    """Return the derivative (T, n_v), N·m·s/rad or N·s/m, of friction in each tree joint by its rate, at v (T, n_v)."""
-    return _of_frictions(tree, v, Friction.slope)
-
-
-def _of_frictions(tree: KinematicTree, v: Array, of: Callable[[Friction, Array], Array]) -> Array:
-    force = np.zeros_like(v)
-    for node in tree.nodes:
-        for column, friction in zip(range(node.v.start, node.v.stop), node.joint.frictions, strict=False):
-            force[:, column] = of(friction, v[:, column])
+    force = model.along_cut.resistance(q, v)
+    for column, friction in _frictions(model.tree):
+        force[:, column] += friction.resistance(v[:, column])
     return force
+
+
+def friction_damping(model: Model, q: Array, *, is_at_rest: bool = False) -> Array:
+    """Return the damping matrix (n_v, n_v), N·m·s/rad or N·s/m, of friction at q (n_q,), as `Friction.damping`."""
+    D = model.along_cut.damping(q, is_at_rest=is_at_rest)
+    for column, friction in _frictions(model.tree):
+        D[column, column] += friction.damping(is_at_rest=is_at_rest)
+    return D
+
+
+def _frictions(tree: KinematicTree) -> Iterator[tuple[int, Friction]]:
+    for node in tree.nodes:
+        yield from zip(range(node.v.start, node.v.stop), node.joint.frictions, strict=False)

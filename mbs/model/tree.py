@@ -302,14 +302,14 @@ class AlongCut:
             force += self._all[k].resistance(np.einsum("tj,tj->t", G, v))[:, None] * G
         return force
 
-    def damping(self, q: Array) -> Array:
-        """Return the damping matrix (n_v, n_v), N·m·s/rad or N·s/m, of viscous friction at q (n_q,)."""
+    def damping(self, q: Array, *, is_at_rest: bool) -> Array:
+        """Return the damping matrix (n_v, n_v), N·m·s/rad or N·s/m, of friction at q (n_q,), as `Friction.damping`."""
         D = np.zeros((self._n_v, self._n_v))
         gradients = self.measured(q[None])[1][0] if self._rough else D
         for k in self._rough:
             friction, G = self._all[k].friction, gradients[k]
             assert friction is not None
-            D += friction.viscous * np.outer(G, G)
+            D += friction.damping(is_at_rest=is_at_rest) * np.outer(G, G)
         return D
 
     def motions(self, q: Array, v: Array, times: Array) -> list[CutMotion]:

@@ -14,7 +14,7 @@ import numpy as np
 from ...common.arrays import Array
 from .. import _core
 from ..linear.vibration import Vibrations, vibrations_of
-from ..model.gears import tree_resistance_slope
+from ..model.gears import friction_damping
 from ..model.known_motion import State
 from ..model.model import Model
 from ..model.system import MultibodySystem
@@ -264,7 +264,7 @@ def fastest_friction(system: MultibodySystem, at: State) -> tuple[float, str]:
     The largest eigenvalue of M⁻¹ D under the constraints, D the slopes of friction at zero rates; 0 without friction.
     """
     model, nothing = system.model, np.zeros(system.model.tree.n_v)
-    D = np.diag(tree_resistance_slope(model.tree, nothing[None])[0]) + model.along_cut.damping(at.q)
+    D = friction_damping(model, at.q, is_at_rest=True)
     if not D.any():
         return 0.0, ""
     by_forces = system.core.derivatives(system.scene, 0.0, at.q, at.v, nothing).a_f
