@@ -32,7 +32,7 @@ class _Ends(NamedTuple):
     far: float = 20.0  # times the longest way of a piece in the time of the run: what a brief piece has to move
     parts: int = 16  # of such a piece
     dense: int = 8  # times within an even interval: a hump of a quarter of it is met by two
-    hump: float = 0.02  # of the range of a function, by which it has to leave the straight line in an interval
+    hump: float = 0.02  # of the range of a function, by which it has to leave the straight line in three intervals
     few: float = 0.1  # of the intervals: a function with more humps oscillates, and steps find that
 
 
@@ -92,20 +92,21 @@ def _humps(function: TimeFunction, ends: Array) -> Array:
     """Times (n,) s about places where a function comes and goes between two `_even` times; none where it does all over.
 
     Of times that are `ENDS.dense` times as close those in such intervals and in the ones next to them. Jumps are left
-    out: steps find them, and end at those that conditions tell.
+    out, but those back in one of the next two intervals: steps find them, and end at those that conditions tell.
     """
     times = np.linspace(ends[0], ends[1], ENDS.intervals * ENDS.dense + 1)
     values = np.nan_to_num(function.sample(times)[0])
     if ENDS.dense * np.abs(np.diff(values)).max() <= ENDS.hump * np.ptp(values):
         return times[:0]  # no interval has that much of the range
-    cells = values[np.arange(ENDS.intervals)[:, None] * ENDS.dense + np.arange(ENDS.dense + 1)]
+    three = np.arange(3 * ENDS.dense + 1)
+    cells = values[np.arange(ENDS.intervals - 2)[:, None] * ENDS.dense + three]
     change, range_ = cells[:, -1] - cells[:, 0], np.ptp(cells, axis=1)
-    off = np.abs(cells - cells[:, :1] - change[:, None] * np.linspace(0.0, 1.0, ENDS.dense + 1)).max(axis=1)
+    off = np.abs(cells - cells[:, :1] - change[:, None] * three / three[-1]).max(axis=1)
     steps = np.abs(np.diff(cells, axis=1)).max(axis=1)
     leaving = (off > ENDS.hump * np.ptp(values)) & (np.minimum(np.abs(change), steps) < 0.5 * range_)
     if not 0 < np.count_nonzero(leaving) < ENDS.few * ENDS.intervals:
         return times[:0]
-    about = np.convolve(leaving, np.ones(3), mode="same") > 0
+    about = np.convolve(leaving, np.ones(5))[1:-1] > 0
     about &= np.histogram(function.switches(), times[:: ENDS.dense])[0] == 0
     return times[:-1][np.repeat(about, ENDS.dense)]
 
