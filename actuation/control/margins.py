@@ -267,8 +267,8 @@ def suggested_gains(
 
     P = J ω² and D = 2 J ω, critical damping of the inertia J of each joint with rigid links and other joints locked,
     the largest of the `models`. ω is a third of the lowest frequency with locked motors (at most half: Craig,
-    Introduction to Robotics, sec. 9.9), with at least 30 samples a period, and is reduced, `most_times`, until the
-    sampled loops of all models are stable with twice the gains.
+    Introduction to Robotics, sec. 9.9), with at least 30 samples a period. It is reduced, in `most_times` trials, until
+    the sampled loops of all models are stable with twice the gains.
     """
     inertias = [joint_inertia(model) for model in models]
     known = [np.diag(inertia) for inertia in inertias if inertia is not None]

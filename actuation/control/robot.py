@@ -130,7 +130,7 @@ class PatchSignals:
     """The k patches of one link, and the m uncoupled modal coordinates that they excite, the lowest first."""
 
     inputs: tuple[str, ...]  # names of the voltages, and of the readings
-    omega: Array  # (served,) rad/s, natural frequencies of those that are no attachment modes
+    omega: Array  # (served,) rad/s, natural frequencies without attachment modes
     gain: Array  # (k, m) V√kg/N, voltages per force on each of these coordinates
     volts: Array  # (k, m) V/(m·√kg), readings per unit of each coordinate
     own: Array  # (m, n) these coordinates from all n modal coordinates p of the link
@@ -222,7 +222,7 @@ def input_names(robot: ControlledRobot) -> tuple[str, ...]:
 
 
 def estimate(volts: Array, count: int) -> Array:
-    """Return the matrix (count, k), m·√kg/V, from readings of k patches to estimates of the lowest coordinates.
+    """Return the matrix (≤ count, k), m·√kg/V, from readings of k patches to estimates of the lowest coordinates.
 
     `volts` (k, m), V/(m·√kg): readings per unit of each coordinate.
     """

@@ -4,8 +4,8 @@ Displacements of modes across the plane keep their share of m_ff = 1. Masses hav
 shapes: translations along x and y, an expansion (x, y) and a rotation (−y, x). A body gets the integrals of a mass that
 is as wide along x as along y about its center, which has no others: then geometric stiffening is the same in 3D.
 
-Mechanisms whose joints all turn about the normal of a plane or slide in it, and whose bodies bend in it, are solved in
-the plane, with the same q, v and forces along them. Offsets, forces and loop equations across it do no work. Reactions
+Mechanisms whose joints turn about the normal of a plane or slide in it, and whose bodies bend in it, are solved in
+the plane. They keep q, v and forces along them. Offsets, forces and loop equations across it do no work. Reactions
 (`quantities/reactions.py`) follow from the motion in space.
 """
 

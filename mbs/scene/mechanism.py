@@ -21,7 +21,7 @@ from .topology import Edge, Topology, spanning_forest
 from .trajectories import Trajectory
 
 Word = Literal["up", "down", "right", "left", "noflip", "flip", "positive", "negative"]
-"""How a joint stands in one of several postures: see `solve.branches`."""
+"""How a joint stands in one of several postures: see `posture.branches`."""
 
 Numbers = Annotated[Quantity | tuple[Quantity, ...], Spelled(Quantity)]
 
