@@ -25,7 +25,7 @@ class RobotModes:
     """The f modes of a robot, slowest first; two real poles that follow each other make one."""
 
     poles: ComplexArray  # (f, 2) complex, 1/s
-    # (f, f) complex, δs of the first pole's eigenvector by mode, of unit kinetic amplitude (δsᴴ M δs = 1) and with its
+    # (f, s) complex, δs of the first pole's eigenvector by mode, of unit kinetic amplitude (δsᴴ M δs = 1) and with its
     # largest entry real
     shape: ComplexArray
     motion: ComplexArray  # (f, coordinates) complex, the same as δq of all bodies
@@ -145,7 +145,7 @@ def joint_conditions(mechanism: LinearMechanism) -> dict[str, JointCondition]:
 
 
 def free_coordinates(mechanism: LinearMechanism, condition: str) -> FreeCoordinates:
-    """The coordinates of joints and modes that are free with joints "locked", or in the `condition` "compliant"."""
+    """Coordinates of joints and modes that are free in the `condition` "locked" (joints) or "compliant" (motors)."""
     joints = [name for name in mechanism.inputs if name.startswith("joint/")]
     if condition == LOCKED:  # motors behind compliant gears stand still, too
         names = [*joints, *(name for name in mechanism.outputs if name.startswith("motor/"))]

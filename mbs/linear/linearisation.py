@@ -53,7 +53,7 @@ class LinearMechanism:
     names: tuple[str, ...]  # (f,) of s: "joint/NAME" (or what was chosen instead), then "modal/BODY/k", k from 1
 
     def of_tool(self, point: str) -> Array:
-        """Jacobian (k, f) of "BODY.POINT" by s, m and rad, as in `points`, but in axes of the point, if it has any."""
+        """Jacobian (k, f) of "BODY.POINT" by s, m and rad, as in `points`, but in its own axes, if any."""
         J = self.points[point]
         return self.tool_axes[point] @ J if point in self.tool_axes else J
 

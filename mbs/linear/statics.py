@@ -53,7 +53,7 @@ def initial_state(model: Model, undeformed: State) -> State:
 
 
 def hanging_joints(model: Model, undeformed: State, start: State) -> Iterator[str]:
-    """Yield warnings where the equilibrium `start` is unstable, or has joints away from `undeformed`, by [initial]."""
+    """Yield warnings where the equilibrium `start` is unstable, or has joints away from `undeformed`."""
     if model.scene.initial.state != "static":
         return
     away, scales, moved = np.abs(start.q - undeformed.q), model.joint_sizes, []
@@ -289,7 +289,7 @@ def static_shapes(
     stiffness: Callable[[Array, Indices], Array],
     count: int,
 ) -> tuple[Array, Booleans]:
-    """Modal coordinates p (T, n) of all bodies with zero residual `forces` at `count` T times; which are found (T,).
+    """Modal coordinates p (T, n) of all bodies with zero residual `forces` at T = `count` times; which are found (T,).
 
     `omega`, `sizes` (n,): frequencies of the modes, rad/s, and p, m·√kg, that bends a link by about its length: beyond
     it nothing counts as found. `forces`(p, numbers of times) returns residual modal forces (k, n) with joints that

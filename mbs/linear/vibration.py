@@ -18,7 +18,7 @@ from ..posture.redundancy import resolved
 from ..posture.start import relaxed_gears, undeformed_posture
 
 DEPENDENT = 1e-9  # of the largest singular value: below it a row repeats others
-RIGID = 1e-9  # of the largest strain of a unit motion, in units of its spring
+RIGID = 1e-9  # of the largest strain of a unit motion, in units of its spring: less is none
 
 
 class Vibrations(NamedTuple):

@@ -47,7 +47,7 @@ class StartPosture(NamedTuple):
 
 
 def start_postures(model: Model) -> list[StartPosture]:
-    """Return the start posture of the scene, then all others that are found, the nearest first.
+    """Return the start posture of the scene, then all others found, nearest first.
 
     Others are sought where constraint equations determine every joint at t = 0; their angles are within ±π. Of
     postures on one branch only the nearest, which `chosen_start` takes, keeps its `branch`; the others have {}.
@@ -77,7 +77,7 @@ def _posture(model: Model, q: Array, start: Array) -> StartPosture:
 
 
 def chosen_start(model: Model) -> StartPosture | None:
-    """The start posture on the scene's `initial.branch` nearest to the guess; None if the scene names no branch.
+    """The start posture on the scene's `initial.branch` nearest to the guess; None without this key.
 
     Raises `InputError` if no start is on it.
     """

@@ -1,4 +1,4 @@
-"""Joints that leave the range which the scene gives them.
+"""Joints that leave their range in the scene.
 
 Coordinates of the tree are watched by the core while it integrates, between outputs, too. Others are looked at in
 outputs: those of joints at which loops are cut, and of planar joints that lead backwards, are no entries of the state.
@@ -65,8 +65,8 @@ def watch_limits(scene: _core.TreeScene, tree: KinematicTree) -> None:
 def left_ranges(model: Model, ranges: Sequence[Seen] | None, times: Array, q: Array, v: Array) -> Iterator[str]:
     """Yield a warning for each coordinate outside its position_limit: the first time, and its range.
 
-    `ranges`: what the core found of each of `watched`; None where it did not integrate the motion. Other coordinates
-    are looked at in outputs at `times` (T,), s: `q` (T, n_q), `v` (T, n_v), rad, m and s.
+    `ranges`: what the core found of each of `watched`; None where it did not integrate the motion. Others, then
+    all, are looked at in outputs at `times` (T,), s: `q` (T, n_q), `v` (T, n_v), rad, m and s.
     """
     of_core = zip(watched(model.tree), ranges, strict=True) if ranges is not None else ()
     seen = [(one.joint, one.number, one.seen(values)) for one, values in of_core]
@@ -95,7 +95,7 @@ def _is_sampled(node: Node) -> bool:
 def limited_coordinates(
     model: Model, times: Array, q: Array, v: Array, *, every: bool
 ) -> Iterator[tuple[JointRecord, int, Array]]:
-    """Yield joint, number of the coordinate, and values (T,), rad or m, of coordinates that the core does not watch.
+    """Yield joint, number and values (T,), rad or m, of coordinates of limited joints that the core does not watch.
 
     Motion q (T, n_q), v (T, n_v), SI units, at `times` (T,), s. With `every`, also those that the core watches.
     """

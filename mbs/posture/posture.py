@@ -51,7 +51,7 @@ def mobilities(model: Model, q: Array, times: Array, loop_rank: int = -1) -> lis
 
 
 def singular_ratios(model: Model, q: Array, times: Array, rank: int) -> Array:
-    """Return ratios (T,), smallest to largest of `rank` singular values of all constraint equations at q (T, n_q)."""
+    """Ratios (T,), smallest to largest of `rank` singular values of all equations at q (T, n_q), `times` (T,), s."""
     constraints, is_path = model.constraints, [False] * len(model.rows)
     motions = constraints.core.mobilities(constraints.scene, times.tolist(), q, is_path, model.size, rank)
     return np.array([at.loop_ratio for at in motions])

@@ -39,7 +39,8 @@ TELLS = 0.02  # share of a motion left free that joints must have at all times t
 def resolved(model: Model, end: float) -> Model:
     """The robot with a joint's motion from 0 to `end` (s) as equation for each redundant freedom.
 
-    By the scene's `redundancy`. Raises `InputError` where nothing is redundant, `SolveError` where no motion is found.
+    By the scene's `redundancy`. Raises `InputError` for unsupported joints or loops and if nothing is redundant,
+    `SolveError` where no motion is found.
     """
     criterion = model.scene.redundancy
     if criterion is None or all(not row.is_trajectory for row in model.rows):

@@ -220,7 +220,7 @@ def _guessed_rates(model: Model) -> Array:
 
 
 def out_of_reach(model: Model, times: Array) -> str:
-    """Where the first path that is beyond the reach of the links at one of `times` (T,), s, is; else ""."""
+    """A message on the first path beyond the reach of the links at one of `times` (T,), s; else ""."""
     return next((f'trajectory "{name}" {how}' for name, how in _beyond(model, times)), "")
 
 

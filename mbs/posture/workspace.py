@@ -29,7 +29,7 @@ BEYOND = 1e3  # rad: postures beyond limits of joints come after all others
 class GridAxis:
     """Axis of a grid: coordinate of a joint (its `name`), "x", "y", "z" of a point, or "turn" of its body.
 
-    `values` (n,) are in `unit`, "rad" or "m"; `is_place` of x, y, z.
+    `values` (n,) are in `unit`, "rad" or "m"; `is_place`: x, y, z.
     """
 
     name: str
