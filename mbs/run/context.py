@@ -63,7 +63,7 @@ class WholeLinks:
     model: Model  # the robot with one body for each link
     divided: Mapping[str, DividedLink]  # the links in pieces by name
     places: Mapping[str, str]  # from "LINK.POINT" of such a link to "PIECE.POINT" of the model
-    # turns a run of the model into one of the links; `InputError` where joints between pieces lack coordinates
+    # turns a run of the model into one of the links; `InputError` where joints have other places in the trees
     as_links: Callable[[Run], Run]
 
 

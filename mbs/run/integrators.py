@@ -51,7 +51,7 @@ class Rule(NamedTuple):
     last_resort: float = 100.0
 
     def cost_of_radau(self, coordinates: int, replay: float) -> float:
-        """Cost of a Radau step in DOP853 steps; `replay`: evaluations of a replayed motion per evaluation."""
+        """Cost of a Radau step in DOP853 steps; `replay`: time to find replayed inputs, in evaluations."""
         one = 1.0 + replay
         return (self.of_radau * one + self.of_algebra * coordinates) / (self.of_dop853 * one)
 
@@ -79,8 +79,7 @@ class Contender(NamedTuple):
 class Choice(NamedTuple):
     """An integrator by its name in scenes, and why it was chosen.
 
-    Of two `candidates` the second takes over during the run where it turns out faster, and so back. The name is then
-    "LAST after OTHER".
+    Of two `candidates` either takes over during the run where it turns out faster. The name is then "LAST after OTHER".
     """
 
     name: str

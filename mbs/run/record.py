@@ -94,7 +94,7 @@ class GearMotion:
         angle, rate, acceleration: (T,) θ_m of the motor at the gear's output, rad, rad/s, rad/s².
         moment: (T,) motor torque at the gear's output, N·m: τ_s and that which accelerates the rotor.
         unresolved: part of the largest moment by which it changes when only every second output is known.
-        twist: (T, 3) δ = θ_m − γ, rad, γ the joint's coordinate, with its two derivatives by s.
+        twist: (T, 3) δ = θ_m − γ, rad, γ the joint's coordinate, with two derivatives by time.
         curve: δ(t) between outputs; None where outputs are too few.
     """
 

@@ -57,7 +57,7 @@ def reached_samples(samples: _core.Samples | None, time: Array) -> tuple[Array, 
 
 
 def some_of(times: Array, rates: Array, ends: Array, most: int) -> Indices:
-    """Numbers of about `most` of the samples at `times` (k,), s, and of those about the highest of `rates` (k, n_v).
+    """Numbers of about `most` of the samples at `times` (k,), s, and of those about the highest of `rates` (k, n).
 
     The first, the last, and those at the times `ends`, s, are among them.
     """

@@ -283,7 +283,7 @@ def warnings_of(context: Context, posed: Posed, intervals: int, least: Tracked) 
 
 
 def price_of_tolerance(asked: Transition, least: Tracked) -> float | None:
-    """Decrease of the least voltage per path tolerance, V/m; None without a tolerance, or where it is too small."""
+    """Decrease of the least voltage per path tolerance, V/m; None without one, or if it is too small."""
     if asked.tolerance is None:
         return None
     prices = float(least.prices["error"].sum() + least.prices["curving"].sum() / asked.tolerance.time**2)

@@ -52,7 +52,7 @@ class Program:
 class Minimum(NamedTuple):
     """Solution x (N+1, s) of a `Program`, multipliers (N, i) ≥ 0 of C z ≤ d, and whether the method converged.
 
-    `halfway`: slack, multipliers and distance of all unknowns from the minimum at an iteration inside the bounds.
+    `halfway`: slack, multipliers and all unknowns, x less that of the minimum, at an iteration inside the bounds.
     """
 
     x: Array

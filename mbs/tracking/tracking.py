@@ -196,7 +196,7 @@ class TrackedPath(AroundPath):
     tolerance_price: float | None  # V/m, decrease of the least voltage per path tolerance
     # largest deviation from the path with the same torques but no voltages, m or rad; NaN where not found
     without_patches: float = np.nan
-    is_needed: bool = True  # whether `without_patches` is more than the tolerance times the path's way
+    is_needed: bool = True  # whether `without_patches` exceeds `path_tolerance`, and tolerance times the path's way
 
 
 def least_voltage(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking) -> tuple[float, float]:

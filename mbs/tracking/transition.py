@@ -131,8 +131,8 @@ class Tracked:
     iterations: int
     share: float  # σ, the least share of limits (`objective` "least-…"), or of V_ref or τ_ref where there are none
     cost: float  # J; 0 where it is not the objective
-    # decrease of J, or σ, per unit of limits: "voltage", "slew" and "current" of patches (m,), 1/V, s/V, 1/A, and
-    # "torque" of motors (motors,) 1/(N·m) or 1/N; zero where a limit is not reached
+    # decrease of J, or σ, per unit of limits, 0 of others: "voltage", "slew", "current" (m,), 1/V, s/V, 1/A, "torque"
+    # (motors,), 1/(N·m) or 1/N, of points "error" and "curving", 1/m, s²/m
     prices: dict[str, Array]
     objective: Objective
     # largest residual modal force between Gauss points, relative to the largest elastic one
