@@ -43,7 +43,7 @@ class Start(NamedTuple):
 def mode_error(run: Run) -> float | None:
     """Estimated error of torques, reactions and deflections for too few modes, as a share of their peaks.
 
-    None for links without attachment modes. These contain the static part of the eigenmodes that are left out. The
+    None for rigid robots, or links without attachment modes. These contain the static part of omitted eigenmodes. The
     dynamic part is about that of a vibration at ω_m between the highest eigenmode kept, ω_k, and the lowest attachment
     mode above it, ω_a (Rayleigh): ω_m² = ω_k ω_a. So δp = (1/ω_m² − 1/ω²) p̈, limited to the largest p where attachment
     modes ring at their own ω, as after a jump of the acceleration. The estimate is the largest √(δpᵀ K δp) of a link

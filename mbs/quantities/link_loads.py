@@ -30,7 +30,7 @@ class LinkLoads(NamedTuple):
 
 
 def loads_on_links(run: Run, bodies: Iterable[str]) -> dict[str, LinkLoads]:
-    """Return the loads on `bodies`, with motors in place of path forces; {} if motors turn frames, not interfaces."""
+    """Return loads on `bodies`, with motors, if they suffice, in place of path forces; {} if these turn frames."""
     if run.model.scene.motors == "frame":
         return {}
     model, behind = run.model, behind_gears(run)

@@ -278,7 +278,7 @@ def deflection(run: Run, point: str) -> Array:
 
 
 def joint_motion(run: Run, name: str) -> tuple[Array, Array] | None:
-    """Return coordinates (T, k), rad or m, without jumps, of a joint, and their rates, 1/s; None where it has none."""
+    """Return coordinates (T, k), rad or m, without jumps, of a joint, and rates, rad/s or m/s; None if it has none."""
     if of_cut := [motion for one, motion in cut_motions(run) if one.joint.name == name]:
         return np.array([one.coordinate for one in of_cut]).T, np.array([one.rate for one in of_cut]).T
     number = run.model.tree.carried.get(name)

@@ -21,7 +21,7 @@ from .motion import system_of
 
 
 def path_force(run: Run, trajectory: str) -> Array:
-    """Return −λ (T, m) of the m constraint equations of a path: forces (N), then moments (N·m), about global axes."""
+    """Return −λ (T, m) of a path's m equations: forces on its point, N, then moments, N·m, global axes."""
     chosen = [k for k, row in enumerate(run.model.rows) if row.is_trajectory and row.owner == trajectory]
     return -run.multipliers[:, chosen]
 
@@ -34,9 +34,10 @@ def followed_trajectories(run: Run) -> list[Trajectory]:
 
 @kept
 def actuator_forces(run: Run) -> MotorForces | None:
-    """Return required forces of motors, through compliant gears, and on modes; None if nothing is prescribed.
+    """Return required forces of motors, through compliant gears, and on modes.
 
-    Modal forces of links in pieces follow by virtual work from those on their pieces.
+    None if nothing is prescribed, or not `motors_fit` in the plane. Modal forces of links in pieces follow from
+    those on their pieces by virtual work.
     """
     supplied = _supplied(run)
     if supplied is None:
