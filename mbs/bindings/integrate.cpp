@@ -33,7 +33,7 @@ void bind_kinds(nb::module_ &m) {
 
 void bind_integrate(nb::module_ &m) {
   bind_kinds(m);
-  nb::class_<IntegrationControls>(m, "IntegrationControls", "Methods and limits of an integration; max_steps 0: none.")
+  nb::class_<IntegrationControls>(m, "IntegrationControls", "Settings of an integration; max_steps 0: no limit.")
       .def(
           "__init__", &make_controls, nb::kw_only(), "tolerance"_a, "max_steps"_a, "methods"_a, "spectral_radius"_a,
           "methods: (kind, cost of a step, expected pace in s of the run per cost) of one, or of two of which the run\n"
@@ -47,7 +47,7 @@ void bind_integrate(nb::module_ &m) {
                                      "States within a run, closer than its outputs: mbs/core/integrate/integrate.h.");
   samples
       .def(nb::init<double, std::size_t, int>(), "longest"_a, "most"_a, "parts"_a = 1,
-           "longest: s between two samples; most: number of samples; parts: of each step, at least.")
+           "longest: s between two samples; most: samples in all; parts: of each step, at least.")
       .def_ro("every", &Samples::every, "Ends of every so many steps are samples.")
       .def_prop_ro("times", [](const Samples &s) { return as_vector(s.times); })
       .def_prop_ro(

@@ -24,7 +24,7 @@ void bind_forward_motion(nb::module_ &m) {
             model->joint_forces = scene.joint_forces, model->gears = scene.gears;
           },
           "bodies"_a, "ground"_a, "rows"_a, "wrenches"_a, "gravity"_a, "scene"_a,
-          "The scene has joint forces, gears and cut joints.")
+          "Of the scene, only joint forces, gears and cut joints.")
       .def_rw("guid", &ForwardModel::guid)
       .def_rw("inputs", &ForwardModel::inputs)
       .def_rw("linear", &ForwardModel::linear)

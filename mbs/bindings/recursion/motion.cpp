@@ -187,7 +187,7 @@ void bind_loads(nb::class_<Scene> scene) {
       .def(
           "add_point_force",
           [](Scene &s, int wrench, const StateFunction &function) { s.point_forces.push_back({wrench, function}); },
-          "wrench"_a, "function"_a, "A force by the motion of the section on which a wrench of the model acts.")
+          "wrench"_a, "function"_a, "A force that depends on the motion of the section of a wrench.")
       .def(
           "add_cut_load",
           [](Scene &s, int joint, const TimeFunction &magnitude, double share) {
