@@ -32,7 +32,7 @@ class ToolError:
     Attributes:
         controlled: with joints position-controlled on the computed angles, or in a closed loop; of analyses that
             prescribe the path and have actuators for it, the error of the computation.
-        open_loop: with the computed torques open loop; where `growth` > 0 an estimate for the first vibration.
+        open_loop: with the computed torques open loop; without a replay an estimate for the first vibration.
         growth: 1/s, rate at which deviations grow under these torques; 0 where stable or not known.
     """
 
@@ -49,7 +49,7 @@ STILL = 0.01  # of the tolerance within which a point has settled: a smaller res
 
 
 def vibrates(about: Mapping[str, Any]) -> bool:
-    """Whether attributes of `settling/POINT` have a settling time not 0, or residual vibration that matters."""
+    """Whether attributes of `settling/POINT` have a settling time other than 0, or residual vibration that matters."""
     return bool(about["residual"] > STILL * about["tolerance"] or about["time_to"] != 0.0)
 
 

@@ -370,7 +370,7 @@ def write_state(file: h5py.File, solution: Solution) -> None:
 
 
 def left_out(solution: Solution) -> list[str]:
-    """Names of the analyses that had not begun when a signal or an exception ended the run; [] after a failed one."""
+    """Names of analyses without a run, after a signal or an exception; [] where a run failed."""
     if any(outcome.failed and outcome.status not in STOPPED for outcome in solution.outcomes.values()):
         return []
     return [one.name for one in solution.scene.analysis if one.name not in solution.outcomes]

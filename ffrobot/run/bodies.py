@@ -36,7 +36,7 @@ class LoadedBody:
         carrying: the same with these payloads at small rotations: its modes are those of the loaded link.
         structure: change of mass and stiffness by patches; None without any.
         modal, path: its modal body and the file of that, None where it is rigid.
-        computed, reused: whether stage 1 ran for it, and if not, why.
+        computed, reused: whether stage 1 ran for it; "modes" or "mesh" if of an earlier run.
         motions: families of motion (bending, torsion, axial) that the scene can require of a link.
     """
 

@@ -85,7 +85,7 @@ def fastest(scene: Scene, judge: Judge) -> tuple[Scene, str]:
 
 
 def least_stretch(keeps_limits: Callable[[float], bool], least: float, most: float) -> float | None:
-    """The least factor of times in [least, most] with which `keeps_limits` is true, to 0.5 %; None without any.
+    """The least factor of times in [least, most] with which `keeps_limits`, to 0.5 %, or None.
 
     From 1 on by factors until it lies between two, then by bisection of their ratio.
     """

@@ -54,7 +54,7 @@ def files_of(path: Path) -> list[Path]:
 
 
 def fingerprints(scene: Mapping[str, Any], path: Path) -> dict[str, str]:
-    """SHA-256 of all files that the tables `scene`, read from `path`, name, by file name; of the version by `PROGRAM`.
+    """SHA-256 by path of `path`, with the tables `scene`, and of all files that it names; the version by `PROGRAM`.
 
     Of TOML files that of their tables: comments change nothing.
     """

@@ -201,7 +201,7 @@ class AnalysisResult:
     def predicted_shift(self) -> Mapping[str, Array]:
         """Estimated shift (T, 3), m, of each point by modal forces that no actuator supplies.
 
-        {} without such forces, and where joints between pieces have no coordinates in whole links.
+        {} without such forces, or where joints have other places in the tree of pieces.
         """
         run, of = self.run, self.histories
         asked, forces = of.actuation, actuator_forces(of.run)
