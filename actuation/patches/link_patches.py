@@ -85,11 +85,6 @@ class LinkPatches:
         return self.reach.amplifiers
 
     @property
-    def driven(self) -> Array:
-        """Whether voltages drive each patch (k,)."""
-        return driven_patches(self.arrays.values())
-
-    @property
     def edges(self) -> Array:
         """Where the patches begin and end (k, 2), m from the root."""
         return np.concatenate([array.edges for array in self.arrays.values()])
@@ -243,17 +238,18 @@ def on_pieces(
                 f"one at {cuts[through][0]:g} m: change pieces, or centers",
             )
     body, bodies = whole.body, {whole.body: whole.bodies[whole.body]}
+    driven = driven_patches(whole.arrays.values())
     spread = spread_of(link, list(pieces.values()))
     ends = np.cumsum([modal.mode_count for _, modal in pieces.values()])
     for (name, (start, modal)), to_piece in zip(pieces.items(), np.split(spread, ends[:-1]), strict=True):
         on_piece = whole.placed_on(start, modal.length)
-        columns, k = [k for which, _ in on_piece for k in which], len(whole.driven)
+        columns, k = [k for which, _ in on_piece for k in which], len(driven)
         (charge, turn), capacitance = np.zeros((2, modal.mode_count, k)), np.zeros((k, k))
         found = effects(_key(path, body), [placed for _, placed in on_piece], modal) if on_piece else []
         for (which, _), of in zip(on_piece, found, strict=True):
             charge[:, which], turn[:, which] = of.Phi_V.T, of.turn.T
             capacitance[np.ix_(which, columns)] = of.capacitance
-        bodies[name] = OnBody(charge * whole.driven, turn, to_piece.T, charge, capacitance)
+        bodies[name] = OnBody(charge * driven, turn, to_piece.T, charge, capacitance)
     return replace(whole, bodies=bodies)
 
 
