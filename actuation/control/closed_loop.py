@@ -147,8 +147,9 @@ class ClosedLoop(SampledAnalysis):
         readings = loop.readings if observed is None else np.hstack([loop.readings, observed.estimates])
         found, along = loops_about(setup, begun, readings[: loop.taken], models)
         filtering = filters(read, self.sample_time)
-        every = ((model, feedback.behind(*filtering)) for model, feedback in found)
-        loops = [loop for loop in every if eigenvalue_count(loop, self.sample_time, self.delay) <= MOST]
+        # not of slower sensors, whose loops are not the same from sample to sample
+        every = ((model, feedback.behind(*filtering)) for model, feedback in found if not loop.is_slow)
+        loops = [one for one in every if eigenvalue_count(one, self.sample_time, self.delay) <= MOST]
         estimate = None
         if observed is not None:
             true = ideal.read(*np.split(np.array(states[: loop.taken]), [n_q, rates], axis=1)).T

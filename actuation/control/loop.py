@@ -52,6 +52,7 @@ class Loop:
         self._resolution = resolution[self._coarse]
         self._largest = np.array([signal.sensor.range or np.inf for signal in read])
         self._every = np.array([round((signal.sensor.sample_time or T) / T) for signal in read])
+        self.is_slow = bool((self._every > 1).any())
         self._filter = Filter(read, T)
         self._controllers, self._range, self._feed_forward = controllers, range, setup.feed_forward
         self.blur = resolution + noise  # (outputs,)
@@ -71,7 +72,7 @@ class Loop:
         y = np.minimum(np.maximum(self._filter(y) + self._errors[k], -self._largest), self._largest)
         if self._coarse.size:
             y[self._coarse] = np.round(y[self._coarse] / self._resolution) * self._resolution
-        if k and self._every.max(initial=1) > 1:
+        if k and self.is_slow:
             y = np.where(k % self._every == 0, y, self.readings[k - 1])
         wanted = self._feed_forward[k].copy()
         for controller in self._controllers:
