@@ -166,7 +166,6 @@ def sweep(
     parallel on one machine, mpirun and --scheduler on several. The exit code is 1 if no run completes.
     """  # noqa: D301 (click wants the backspace itself)
     from ..present.console import Display, summary_console
-    from ..sweep.runs import missing_columns
     from ..sweep.sweep import drop_results, forget_failures, plan_sweep, print_table, run_sweep, stale_rows
 
     folder = output or scene_file.with_suffix(".sweep")
@@ -178,8 +177,6 @@ def sweep(
         click.echo(f"ffrobot: {changes}", err=True)
     with Display() as display:
         rows = run_sweep(plan, batch, display)
-    for line in missing_columns(rows, plan.collect, plan.folder):
-        click.echo(f"ffrobot: {line}", err=True)
     if not keep:
         drop_results(plan)
     print_table(plan, rows, summary_console())

@@ -150,13 +150,14 @@ def _quantities(path: Path, run: SweepRun) -> dict[str, float]:
                         quantities[f"{name} max"] = _reduce(results, name, "max")
         for request in run.collect:
             name, reduction = collected(request)
-            if name in SETTLING:
-                with suppress(InputError):
-                    quantities[f"{name} {reduction}"] = float(results.settling(reduction)[1][SETTLING[name]])
-            else:
-                wanted, bracket, column = name.partition("[")
-                dataset = by_dots(results, list(results)).get(wanted.replace("/", "."), wanted)
-                quantities[f"{name} {reduction}"] = _reduce(results, f"{dataset}{bracket}{column}", reduction)
+            with suppress(InputError):
+                if name in SETTLING:
+                    value = float(results.settling(reduction)[1][SETTLING[name]])
+                else:
+                    wanted, bracket, column = name.partition("[")
+                    dataset = by_dots(results, list(results)).get(wanted.replace("/", "."), wanted)
+                    value = _reduce(results, f"{dataset}{bracket}{column}", reduction)
+                quantities[f"{name} {reduction}"] = value
     return quantities
 
 
@@ -167,34 +168,26 @@ def by_dots(results: Results, datasets: Sequence[str]) -> dict[str, str]:
     return short | {name.replace("/", "."): name for name in datasets}
 
 
-def missing_columns(rows: Sequence[Row], requests: Sequence[str], folder: Path) -> Iterator[str]:
-    """Yield a line for each `--collect` request that no completed run in `folder` contains."""
-    completed = [row for row in rows if row.status == "completed"]
-    for request in requests:
-        name, reduction = collected(request)
-        values = [row.quantities.get(f"{name} {reduction}") for row in completed]
-        if not completed or any(one is not None and (name in SETTLING or not np.isnan(one)) for one in values):
+def missing_columns(row: Row, requests: Sequence[str], results: Path) -> Iterator[str]:
+    """Yield a line for each `--collect` request that a completed run with these `results` does not contain."""
+    for name, reduction in map(collected, requests):
+        what, found, near = "the name of a dataset", name, ""
+        if f"{name} {reduction}" in row.quantities:
             continue
         if name in SETTLING:
-            yield f'--collect: expected a point with residual vibration, found no "{reduction}" in any run'
+            what, found = "a point with residual vibration", reduction
         else:
-            known: list[str] = []
-            for path in (folder / "runs").glob(f"*/{RESULTS}"):
-                with suppress(InputError), Results(path) as results:
-                    known = known or list(results)
-            near = did_you_mean(name, known)
-            yield f'--collect: expected the name of a dataset, found no "{name}" in any run{near}'
+            with suppress(InputError), Results(results) as file:
+                near = did_you_mean(name, list(file))
+        yield f'--collect: expected {what}, found no "{found}" in run {row.number}{near}'
 
 
 def _reduce(results: Results, name: str, reduction: str) -> float:
-    """Of a history, of the lengths of vectors (T, 2 or 3), or of the largest of several columns; NaN if absent.
+    """Of a history, of the lengths of vectors (T, 2 or 3), or of the largest of several columns.
 
     Of spectra "max" is that of all vibrations, the others are of the lowest one.
     """
-    try:
-        values = results.data(name)
-    except InputError:
-        return np.nan
+    values = results.data(name)
     dataset, bracket, column = name.partition("[")
     key = {"max": "peak", "rms": "rms"}.get(reduction, "")
     known = np.atleast_1d(results.attributes(dataset).get(key, ()))  # of all times that the run looked at

@@ -4,6 +4,7 @@ import json
 import math
 import os
 import signal
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from itertools import product
@@ -14,7 +15,7 @@ from time import monotonic
 from rich.console import Console
 
 from ..batch.batch import Batch
-from ..common.errors import InputError, StoppedError
+from ..common.errors import FfrobotWarning, InputError, StoppedError
 from ..common.files import check_folder, write_atomically
 from ..common.keys import MOST_RUNS
 from ..common.libraries import scipy
@@ -25,7 +26,7 @@ from ..present.lines import plain_table
 from ..run.inputs import PROGRAM
 from ..run.watcher import Watcher
 from .files import SCENE, RunFiles, Value, Variation, parse_variation, run_files
-from .runs import RESULTS, ROW, Row, SweepRun, collected, finished_row, perform
+from .runs import RESULTS, ROW, Row, SweepRun, collected, finished_row, missing_columns, perform
 
 PLAN = "plan.json"
 TABLE_SHARE = 0.05  # of the time of a sweep that its table may take: that of 10 000 runs is long
@@ -124,9 +125,15 @@ def run_sweep(sweep: Sweep, batch: Batch, watcher: Watcher) -> list[Row]:
     Raises `InputError` where files change meanwhile, `StoppedError` after a signal.
     """
     rows, waiting = _rows_and_runs(sweep)
+    asked = sweep.collect
 
     def tabulate() -> None:
+        nonlocal asked
         known = [*sweep.earlier, *(rows[k] for k in sorted(rows))]
+        if first := next((row for row in known if asked and row.status == "completed"), None):
+            for line in missing_columns(first, asked, sweep.runs[first.number].folder / RESULTS):
+                warnings.warn(line, FfrobotWarning, stacklevel=1)
+            asked = ()
         quantities = _quantities(known)
         lines: list[list[object]] = [["run", *sweep.keys, "status", *quantities, "message"]]
         for row in known:
