@@ -81,8 +81,9 @@ def read_catalog(path: Path) -> tuple[CatalogMotor, ...]:
     if path.suffix.lower() == ".toml":
         return validate(_Catalog, load_toml(path, "catalog of motors"), path).motor
     header, rows = read_csv(path, "catalog of motors")
-    if not rows:
-        raise InputError(f"{path}: expected a line of columns (name, rated_torque, …) and motors below", "none")
+    if not rows or len(set(header)) < len(header):
+        expected = "a line of different columns (name, rated_torque, …) and motors below"
+        raise InputError(f"{path}: expected {expected}", ", ".join(header) or "none")
     for number, row in rows:
         if len(row) != len(header):
             raise InputError(

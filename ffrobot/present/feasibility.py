@@ -198,15 +198,16 @@ def _rows(joint: str, rated: Sequence[MotorChoice]) -> Iterator[tuple[str, ...]]
 def joint_tasks(results: Results, analysis: str) -> Iterator[tuple[str, JointTask]]:
     """Yield name and load of each joint with a motor and one coordinate, without the inertia of the scene's rotor.
 
-    Accelerations are those of a cubic spline through the rates at outputs. Torques are scaled up to their peak
-    between outputs.
+    Rates are of motors before compliant gears; accelerations are those of a cubic spline through them at outputs.
+    Torques are scaled up to their peak between outputs.
     """
     time = results[f"{analysis}/time"]
     for joint in results.scene.get("joint", ()):
         place = f"{analysis}/joints/{joint['name']}"
         if not (results.has(f"{place}/moment") and results[f"{place}/moment"].ndim == 1) or len(time) < 4:
             continue
-        torque, rate = results[f"{place}/moment"], results[f"{place}/rate"]
+        side = "motor_rate" if results.has(f"{place}/motor_rate") else "rate"
+        torque, rate = results[f"{place}/moment"], results[f"{place}/{side}"]
         acceleration = scipy.interpolate.CubicSpline(time, rate)(time, 1)
         rotor = joint.get("rotor_inertia", 0.0) * joint.get("gear_ratio", 1.0) ** 2
         peak = np.max(results.attributes(f"{place}/moment").get("peak", 0.0))  # between outputs too

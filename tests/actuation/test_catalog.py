@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+import ffrobot
 from ffrobot.actuation.motor_catalog import CatalogMotor, JointTask, choices, read_catalog
 from ffrobot.common.errors import InputError
+from ffrobot.present.feasibility import joint_tasks
 
 OMEGA, INERTIA, AMPLITUDE = 3.0, 2.0, 0.8
 
@@ -29,6 +31,22 @@ def test_inertia_alone(ratio):
     assert found.peak == pytest.approx(peak, rel=1e-6)
     assert found.rms == pytest.approx(peak / np.sqrt(2), rel=1e-6)
     assert found.speed == pytest.approx(ratio * AMPLITUDE * OMEGA, rel=1e-12)
+
+
+def test_a_rotor_before_a_compliant_gear_moves_with_the_motor():
+    """The load of a task is what the gear passes on, whose torque the rotor adds to."""
+    body = {"mass": 2.0, "center": [0.0, 0.0], "inertia": 0.2, "points": {"root": [0.0, 0.0]}}
+    gear = {"gear_ratio": 50.0, "rotor_inertia": 1e-4, "stiffness": 300.0, "damping": 0.05}
+    results = ffrobot.solve(ffrobot.make_scene(
+        name="turn", gravity=[0.0, 0.0], body=[{"name": "b", "rigid": body}],
+        joint=[{"name": "O", "type": "revolute", "between": ["ground", "b.root"], **gear}],
+        trajectory=[{"name": "turn", "motor": "O", "via": [0.0, 1.0], "duration": 0.3}],
+        analysis=[{"name": "run", "kind": "pcid", "end": 0.5, "output_step": 0.002}],
+    ))  # fmt: skip
+    ((_, task),) = joint_tasks(results, "run")
+    passed = results["run/joints/O/gear_moment"]
+    np.testing.assert_allclose(task.load, passed, atol=1e-3 * np.abs(passed).max())
+    assert np.abs(task.rate).max() == np.abs(results["run/joints/O/motor_rate"]).max()
 
 
 def test_losses_of_the_gear_take_when_driving_and_help_when_braking():
@@ -65,7 +83,8 @@ def test_csv_and_toml_say_the_same(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "expected a line of columns"),
+        ("", "expected a line of different columns"),
+        (CSV.replace("max_speed", "peak_torque"), "different columns .*, found name, rated_torque, peak_torque, peak"),
         (CSV.replace("0.3", "strong"), "peak_torque"),
         (CSV + "B, 1\n", "line 3: expected 5 cells with commas, semicolons or tabs between them"),
     ],
