@@ -15,8 +15,9 @@ from ...common.structs import struct
 from ..fields.field_types import NotNegative, PointReference
 from ..linear.joint_conditions import JointCondition, joint_conditions, robot_modes
 from ..linear.linearisation import LinearEquations
-from ..linear.statics import Statics
+from ..linear.statics import Statics, hanging_joints
 from ..model.gears import with_compliance, with_prescribed_motors
+from ..model.known_motion import State
 from ..model.model import Model
 from ..posture.prescribed import following_motors
 from ..posture.redundancy import resolved
@@ -38,6 +39,7 @@ def run_static(context: Context, analysis: Analysis) -> Run:
     statics = Statics(model)
     q = statics.equilibrium(undeformed.q)
     at_rest, times = np.zeros((1, model.tree.n_v)), np.zeros(1)
+    warnings = tuple(hanging_joints(model, undeformed, State(q, at_rest[0]), model.motors))
     return Run(
         analysis=analysis,
         model=model,
@@ -47,7 +49,7 @@ def run_static(context: Context, analysis: Analysis) -> Run:
         a=at_rest,
         multipliers=statics.holding_multipliers(q)[None],
         is_at_rest=True,
-        statistics=Statistics(wall_seconds=time.perf_counter() - began, warnings=tuple(statics.unstable_ways(q))),
+        statistics=Statistics(wall_seconds=time.perf_counter() - began, warnings=warnings),
     )
 
 

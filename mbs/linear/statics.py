@@ -9,7 +9,7 @@ The core has K from dual numbers. λ are at every step those of least squares at
 Optimization, 2006, sec. 18.3), so that nothing adds up in them; of equations that depend on others there they are 0.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -52,19 +52,22 @@ def initial_state(model: Model, undeformed: State) -> State:
     return static_equilibrium(model, undeformed) if model.scene.initial.state == "static" else undeformed
 
 
-def hanging_joints(model: Model, undeformed: State, start: State) -> Iterator[str]:
-    """Yield warnings where the equilibrium `start` is unstable, or has joints away from `undeformed`."""
-    if model.scene.initial.state != "static":
+def hanging_joints(model: Model, undeformed: State, start: State, among: Container[str] | None = None) -> Iterator[str]:
+    """Yield warnings where the equilibrium `start` is unstable, or has joints away from `undeformed`.
+
+    Joints `among` these count; without any, all, where [initial] asks for an equilibrium.
+    """
+    if among is None and model.scene.initial.state != "static":
         return
     away, scales, moved = np.abs(start.q - undeformed.q), model.joint_sizes, []
     for node in model.tree.nodes:
         sizes = np.append(scales[node.v], np.ones(node.joint.q_count - node.joint.freedoms))
-        if (away[node.q] / sizes).max(initial=0.0) > AWAY:
+        if (away[node.q] / sizes).max(initial=0.0) > AWAY and (among is None or node.joint.name in among):
             moved.append(node.joint.name)
     if moved:
         yield (
-            f"starts in the equilibrium in which joints {quoted(moved)} hang, away from [initial]: nothing holds them"
-            ' there; state = "undeformed" starts from [initial]'
+            f"joints {quoted(moved)} hang, away from [initial], as no trajectory holds them there; motions start there"
+            ' with state = "undeformed"'
         )
     yield from Statics(model).unstable_ways(start.q)
 

@@ -137,6 +137,17 @@ def test_a_double_pendulum_has_one_stable_equilibrium(kind, upper, lower, is_sta
     np.testing.assert_allclose(angles, [np.copysign(np.pi / 2, upper), np.pi * (lower > 1)], atol=1e-9)
 
 
+@pytest.mark.parametrize(("kind", "angle", "told"), [("static", np.pi / 2, True), ("linear", 0.3, False)])
+def test_a_motor_without_a_path_hangs_in_a_static_analysis_alone(kind, angle, told):
+    bodies, joints = [rigid("a", center=[0.25, 0.0, 0.0])], [revolute("A", "ground", "a.root", Y)]
+    made = ffrobot.make_scene(**scene(bodies, joints, {"name": "rest", "kind": kind}, initial={"joints": {"A": 0.3}}))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ffrobot.FfrobotWarning)
+        results = ffrobot.solve(made)
+    assert results["rest/joints/A/coordinate"][0] == pytest.approx(angle, abs=1e-9)
+    assert any('"A" hang, away from [initial]' in text for text in results.warnings.get("rest", ())) == told
+
+
 @pytest.mark.parametrize(
     ("guess", "angle", "told"),
     [
