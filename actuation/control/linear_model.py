@@ -355,7 +355,7 @@ class Zeros:
     """The finite zeros (k,), 1/s, from inputs to outputs: those on the left first, the slowest of each side.
 
     `unstable`: those with positive real part. Without any the transfer is minimum phase (undamped ones on the imaginary
-    axis are allowed); with them, an output that follows a path needs inputs that grow, or begin before the path does.
+    axis are allowed).
     """
 
     values: ComplexArray

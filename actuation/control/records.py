@@ -345,8 +345,7 @@ class PythonController(ControllerRecord):
 
     kind: Literal["python"]
     python: Annotated[Any, ReadBy(_python_function, str)]
-    """Function as "FILE.py:FUNCTION" with the file next to the scene, or the function itself in scenes made in Python.
-    """
+    """The function."""
 
 
 class StateFeedback(ControllerRecord):

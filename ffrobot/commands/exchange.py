@@ -121,8 +121,7 @@ ELSEWHERE = {
     "file_format",
     metavar="FORMAT",
     required=True,
-    help="Format: of results csv, joint-trajectory, rosbag2, fmu, c; of scenes urdf, fmu; of bodies sid, mbdyn,"
-    " craig-bampton, exudyn.",
+    help="Format, one of those above.",
 )
 @click.option(
     "--analysis",

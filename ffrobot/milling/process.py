@@ -3,7 +3,7 @@
 The forces on the tool are F = a C(φ) (r(t) − r(t − τ)) with the depth of cut a, the tooth period τ and r = (x, y): x is
 along the feed, y normal to it, and teeth turn from y to x. Averaged over φ, with the receptance G(iω) of r, vibration
 at ω persists where 1 = a (1 − exp(−iωτ)) ν with an eigenvalue ν of C̄ G: a = 1/(2 Re ν) (Y. Altintas and E. Budak,
-CIRP Annals 44, 1995). Of turning, C̄ = −K_s, that is −1/(2 K_s Re G).
+CIRP Annals 44, 1995).
 """
 
 from __future__ import annotations

@@ -2,8 +2,7 @@
 
 Averaging over a time with the weights of a smooth bell (a law from rest to rest, differentiated) makes any stream as
 smooth as the law, and takes this time longer; all joints are averaged alike. Shapers are those of trajectories.
-Inversion leads motors by what strains their gears, K⁻¹τ, through the inverse of their controllers. Durations are found
-with the linear models of postures along the path; what they find is simulated.
+Durations are found with the linear models of postures along the path; what they find is simulated.
 """
 
 from collections.abc import Callable, Iterator, Sequence
