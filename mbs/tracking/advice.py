@@ -173,9 +173,9 @@ def check_reach(posed: Posed, least: Tracked | None) -> None:
         needed += f"; the zero at {bounds.zeros[0].real:.4g} 1/s alone requires {bounds.voltages[0]:.4g} V"
     would = [f"{1e3 * np.log(share) / rate:.3g} ms more of pre_actuation and post_actuation"] if rate else []
     if bounds is not None and bounds.relief.any() and asked.gears is None:
-        of_zeros = bounds.relief > 0.0
-        error = float(((bounds.voltages - limit) / bounds.relief)[of_zeros].max()) + asked.allowed
-        would.append(f"a path_tolerance of more than {1e3 * error:.3g} mm")
+        error = float(((bounds.voltages - limit) / bounds.relief)[bounds.relief > 0.0].max())
+        if error > 0.0:
+            would.append(f"a path_tolerance of more than {1e3 * (error + asked.allowed):.3g} mm")
     would += [
         f"the same path in {servo.end * share ** (1 / _lower_order(servo)):.3g} s instead of {servo.end:g} s",
         f"patches that bend the links {share:.3g} times as much per volt",

@@ -276,7 +276,7 @@ def _solve(context: Context, posed: Posed, analysis: Tracking, least: Tracked) -
         tracked = within_limits(asked, limits, meshes, least, tolerance=analysis.tolerance, step=analysis.output_step)
     if not tracked.converged:
         what = analysis.objective.removeprefix("least-")
-        cure = causes(context, posed) or f"{raised(posed)}, or the tolerance"
+        cure = causes(context, posed) or f"{raised(posed)}, intervals or the tolerance"
         raise SolveError(f"{servo.where}: the motion of least {what} was not found: {cure}")
     return tracked, objective
 
