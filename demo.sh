@@ -5,7 +5,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")"
 source scripts/setup.sh
 
 .venv/bin/ffrobot solve cases/two_link/scene.toml
-.venv/bin/ffrobot plot cases/two_link/scene.results.h5 -o cases/two_link/figures
+.venv/bin/ffrobot plot cases/two_link/scene.results.h5
 
-printf '\nResults: cases/two_link/scene.results.h5\nFigures: cases/two_link/figures/ (PNG and PDF)\n'
+printf '\nResults: cases/two_link/scene.results.h5\nFigures: cases/two_link/scene.results.figures/ (PNG and PDF)\n'
 printf 'What they show and how they compare with the paper: cases/two_link/README.md\n'
