@@ -23,7 +23,7 @@ def remarks_on_link(link: Link, label: str) -> Iterator[str]:
     if (ratio := float(np.max(link.damping.ratio or 0.0))) >= OVERDAMPED:
         yield f"{label}: a damping ratio of {ratio:g} is above critical damping, 1: is it in percent?"
     if getattr(link.mesh, "order", None) == 1:
-        yield f"{label}: cells of order 1 bend too stiffly, often by tens of percent; order 2 does not"
+        yield f"{label}: cells of order 1 bend too stiffly, by tens of percent; order 2 does not"
     density, modulus = link.material.density, float(np.max(link.material.youngs_modulus))
     if not LIGHTEST <= density <= HEAVIEST:
         yield f"{label}: density {density:g} kg/m³: units are SI; is it in g/cm³ or t/mm³?"

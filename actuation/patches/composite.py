@@ -255,8 +255,8 @@ class Effects(NamedTuple):
         lever: (k,) strain of the surface per curvature and distance: 1; of its diagonals per twist: β/2.
         turn: (k, n) rotation of the sections at the ends of a patch against each other, in its sense, rad/(m·√kg).
         Phi_V: (k, n) modal forces per volt, N/(√kg·V), reduced by the stiffness of the layers.
-        capacitance: (k, K) charges, F, by voltages of the K patches of the link, as sensors; those with open electrodes
-            are clamped, but for the strains that modes lack.
+        capacitance: (k, K) charges, F, as sensors by voltages of the K patches of the link; open ones are clamped, but
+            for the strains that modes lack.
     """
 
     extent: Array
@@ -283,7 +283,7 @@ def effects(key: str, placed: Sequence[PlacedLayout], body: ModalBody) -> list[E
 
 
 def _each(placed: Sequence[PlacedLayout]) -> tuple[list[PztLayout], Array]:
-    """Layout of each of k patches, and the share (k,) of the patch that lies on the body."""
+    """Layouts of k patches, and the share (k,) of each that lies on the body."""
     layouts = [one.layout for one in placed for _ in one.edges]
     return layouts, np.diff(np.concatenate([one.edges for one in placed]))[:, 0] / [of.length for of in layouts]
 

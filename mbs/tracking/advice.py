@@ -263,7 +263,7 @@ def warnings_of(context: Context, posed: Posed, intervals: int, least: Tracked) 
 
     `intervals`: number with which the analysis begins.
     """
-    servo, limits = posed.asked.driven, np.unique(posed.asked.units)
+    servo, limits = posed.asked.driven, np.unique(np.abs(posed.asked.limits.patches.range))
     if is_beyond(posed, least):
         would = f"{least.share:.3g} times their limits"
         if len(limits) == 1:
@@ -272,7 +272,7 @@ def warnings_of(context: Context, posed: Posed, intervals: int, least: Tracked) 
         yield f"patches cannot do it within their limits. Any of these would do: {would}"
     if least.doubt > 3 * SETTLED:
         yield (
-            f"the least voltage, {least.share * limits[-1]:.3g} V, did not settle on finer meshes: it may"
+            f"the least voltage, {least.share * posed.asked.units.max():.3g} V, did not settle on finer meshes: it may"
             f" be {100 * least.doubt:.2g} % less. Fewer modes, or more intervals"
             if np.isfinite(least.doubt)
             else "the least voltage is that of the first intervals: finer ones had no solution. Fewer modes, or more"
