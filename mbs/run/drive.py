@@ -14,7 +14,9 @@ from ...common.structs import struct
 from .. import _core
 from .._core import TimeFunction
 from ..fields.waypoints import spline
+from ..linear.vibration import gear_matrices
 from ..model.drives import NO_DRIVES, Command, Drives, PointDrive
+from ..model.gears import friction_damping
 from ..model.known_motion import State
 from ..model.model import Model
 from ..model.system import MultibodySystem, integrated_mechanism, zero_order_hold
@@ -40,7 +42,7 @@ from .integrators import (
     Contender,
     beyond_round_off,
     choose_integrator,
-    fastest_friction,
+    fastest,
     unmet,
 )
 from .record import Continuation, Run, Statistics
@@ -383,8 +385,8 @@ FAR_BENT = 0.5  # of a link's radius of gyration, in the mean
 def find_cause(system: MultibodySystem, analysis: IntegratedAnalysis, choice: Choice, run: _core.TreeRun) -> str:
     """A sentence with the likely cause of a failed `run`, and advice; "" where none is found.
 
-    Looked for, in this order: a target that is not a number, a link bent too far, a load that jumps, friction, a
-    singular posture of loops; where steps became too short, the integrator.
+    Looked for, in this order: a target that is not a number, a link bent too far, a load that jumps, friction,
+    gears, a singular posture of loops; where steps became too short, the integrator.
     """
     t, at = run.time_reached, State(*np.split(np.array(run.last), [system.model.tree.n_q]))
 
@@ -395,7 +397,7 @@ def find_cause(system: MultibodySystem, analysis: IntegratedAnalysis, choice: Ch
         not_a_number(_targets(system), accelerations, t)
         or _too_far_bent(system, at)
         or load_jump(_loads(system), t)
-        or _friction(system, analysis, choice, at)
+        or _too_stiff(system, analysis, choice, at)
         or describe_loops(system.model, t, at.q, at.v)
     )
     if causes or run.status != _core.IntegrationStatus.step_underflow:
@@ -463,12 +465,19 @@ def load_jump(loads: Iterable[tuple[str, TimeFunction]], t: float) -> str:
     return ""
 
 
-def _friction(system: MultibodySystem, analysis: IntegratedAnalysis, choice: Choice, at: State) -> str:
-    rate, joint = fastest_friction(system, at)
-    if rate * analysis.end <= TOO_STIFF:
-        return ""
-    implicit = 'integrator = "radau", ' if choice.name in EXPLICIT else ""
-    return (
-        f"friction of {joint} brings it to rest within {1 / rate:.1e} s, which steps of {choice.name} cannot follow:"
-        f" use {implicit}less friction or a larger friction_speed"
-    )
+def _too_stiff(system: MultibodySystem, analysis: IntegratedAnalysis, choice: Choice, at: State) -> str:
+    model, most = system.model, TOO_STIFF / analysis.end
+    rate, joint = fastest(system, at, friction_damping(model, at.q, is_at_rest=True))
+    if rate > most:
+        implicit = 'integrator = "radau", ' if choice.name in EXPLICIT else ""
+        return (
+            f"friction of {joint} brings it to rest within {1 / rate:.1e} s, which steps of {choice.name} cannot"
+            f" follow: use {implicit}less friction or a larger friction_speed"
+        )
+    square, rate = (fastest(system, at, of)[0] for of in gear_matrices(model.tree, at.q))
+    if square > max(most, rate / 2) ** 2:
+        return (
+            f"compliant gears vibrate at {np.sqrt(square):.2g} rad/s, too fast for the run: give them damping or no"
+            " stiffness"
+        )
+    return ""

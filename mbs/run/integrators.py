@@ -232,7 +232,8 @@ def choose_integrator(
         return Choice("dop853", "nothing to integrate")
     if _sticks(model):
         return Choice("radau", "dry friction is a stiff damper to the light ends of links")
-    if (rate := fastest_friction(system, start)[0]) * float(np.ptp(times)) > TOO_STIFF:
+    rate, _ = fastest(system, start, friction_damping(model, start.q, is_at_rest=True))
+    if rate * float(np.ptp(times)) > TOO_STIFF:
         return Choice("radau", f"friction is a stiff damper: joints come to rest within {1 / rate:.1e} s")
     if not model.tree.gears and not any(node.body.n_modes for node in model.tree.nodes):
         return Choice("dop853", "nothing vibrates")
@@ -257,21 +258,19 @@ def choose_integrator(
     return choice if replayed is None else choice._replace(candidates=())
 
 
-def fastest_friction(system: MultibodySystem, at: State) -> tuple[float, str]:
-    """Largest rate (1/s) at which friction brings a joint to rest in the state `at`, and the joint's label.
+def fastest(system: MultibodySystem, at: State, D: Array) -> tuple[float, str]:
+    """Largest eigenvalue of M⁻¹ D (n_v, n_v) under the constraints in the state `at`, and its joint's label.
 
-    The largest eigenvalue of M⁻¹ D under the constraints, D the slopes of friction at zero rates; 0 without friction.
+    Of slopes D of friction: the largest rate (1/s) at which a joint comes to rest.
     """
-    model, nothing = system.model, np.zeros(system.model.tree.n_v)
-    D = friction_damping(model, at.q, is_at_rest=True)
     if not D.any():
         return 0.0, ""
-    by_forces = system.core.derivatives(system.scene, 0.0, at.q, at.v, nothing).a_f
+    by_forces = system.core.derivatives(system.scene, 0.0, at.q, at.v, np.zeros(len(D))).a_f
     rates, shapes = np.linalg.eig(by_forces @ D)
-    fastest = int(np.argmax(rates.real))
-    share = np.abs(shapes[:, fastest])
-    joint = max(model.tree.nodes, key=lambda node: share[node.v].max(initial=0.0)).joint
-    return float(rates[fastest].real), joint.label
+    k = int(np.argmax(rates.real))
+    share = np.abs(shapes[:, k])
+    joint = max(system.model.tree.nodes, key=lambda node: share[node.v].max(initial=0.0)).joint
+    return float(rates[k].real), joint.label
 
 
 def _sticks(model: Model) -> bool:

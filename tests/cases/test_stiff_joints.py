@@ -46,6 +46,18 @@ def test_steps_that_friction_stops(friction, advice):
         ffrobot.solve(made)
 
 
+def test_steps_that_a_gear_makes_short_and_the_damping_that_helps():
+    """ω² = k (1/I + 1/J N²) of rod and rotor; its critical damping, 2 k/ω, settles."""
+    gear = {"motor": True, "rotor_inertia": 1e-4, "gear_ratio": 50.0, "stiffness": 1e12}
+    inertia = np.array([0.02 + MASS * ARM**2, 1e-4 * 50.0**2])
+    omega = np.sqrt(1e12 * (1.0 / inertia).sum())
+    with pytest.raises(ffrobot.SolveError, match="too many steps") as failed:
+        ffrobot.solve(pendulum(analysis={"max_steps": 50, "integrator": "dop853"}, **gear))
+    assert f"compliant gears vibrate at {omega:.2g} rad/s, too fast for the run: give them damping" in str(failed.value)
+    damped = ffrobot.solve(pendulum(**gear, damping=2e12 / omega))
+    assert damped.attributes("fall")["steps"] < 1000
+
+
 def test_an_axis_of_any_length():
     """Its squares may be no numbers."""
     unit, tiny = (ffrobot.solve(pendulum(axis=[0.0, length, 0.0])) for length in (1.0, 1e-200))
