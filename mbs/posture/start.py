@@ -361,7 +361,7 @@ def turned_guesses(scene: MechanismKeys) -> list[str]:
     units = {joint.name: joint.guess_units or joint.units for joint in scene.joint}
     guesses = ((name, np.atleast_1d(np.array(value, dtype=float))) for name, value in scene.initial.joints.items())
     return [
-        f'initial.joints: {name} = {angle:g} rad is more than a turn (degrees are written "{angle:g}*deg")'
+        f'initial: {name} = {angle:g} rad is more than a turn (degrees are written "{angle:g}*deg")'
         for name, values in guesses
         if name not in followed
         for angle, unit in zip(values.tolist(), units.get(name, ()), strict=False)
