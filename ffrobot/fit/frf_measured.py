@@ -93,8 +93,9 @@ def _axis(path: Path, code: float) -> str:
 def _of_csv(path: Path) -> Iterator[Column]:
     """FRFs of a table with a line for each frequency of each function."""
     header, table = read_csv(path, "table of FRFs")
-    for name in header:
-        check_known(name, COLUMNS, f"{path}: line 1: expected columns among {quoted(COLUMNS)}")
+    for k, name in enumerate(header):
+        others = [one for one in COLUMNS if one not in header[:k]]
+        check_known(name, others, f"{path}: line 1: expected columns among {quoted(COLUMNS)}, each once")
     if missing := [name for name in COLUMNS[:-1] if name not in header]:
         raise InputError(f"{path}: line 1: expected the columns {quoted(COLUMNS[:-1])}", f"no {quoted(missing)}")
     if not table:

@@ -307,12 +307,14 @@ def test_files_of_other_kinds(tmp_path):
     savemat(tmp_path / "shape.mat", {**three, "response": ["1/x"]})
     savemat(tmp_path / "text.mat", {**three, "response": ["1/x", "1/x"], "frequency": "fast"})
     (tmp_path / "lacks.csv").write_text("frequency,force,response,real\n5.0,1/x,1/x,1e-3\n")
+    (tmp_path / "twice.csv").write_text(HEADER.replace("imaginary", "real") + "5.0,1/x,1/x,1e-3,2e-3,0.9\n")
     for name in ("empty.csv", "empty.mat", "empty.uff"):
         (tmp_path / name).write_bytes(b"")
     for name in ("other.mat", "other.uff"):
         (tmp_path / name).write_bytes(b"of something else\n" * 30)
     for name, expected in {
         "lacks.csv": 'line 1: expected the columns .* found no "imaginary"',
+        "twice.csv": 'line 1: expected columns .*, each once, found "real"',
         "empty.csv": 'line 1: expected the columns .* found no "frequency", "force", "response", "real", "imaginary"',
         "empty.mat": r"expected a \.mat file of version 7 or older .*, found another file$",
         "other.mat": r"expected a \.mat file of version 7 or older .*, found another file$",
