@@ -126,9 +126,12 @@ def run_files(scene_path: Path, changes: Mapping[tuple[str, ...], Value], folder
     Raises `InputError` for a body without link file, a missing list entry, and a key below a plain value.
     """
     scene, links = _read(scene_path, "scene file"), dict[str, Table]()
+    places = dict[object, tuple[str, ...]]()
     for key, value in changes.items():
         tables, inner = _place(scene_path, scene, key, links)
-        set_key(tables, inner, deepcopy(value), key)  # of which later keys may change a part
+        place = set_key(tables, inner, deepcopy(value), key)  # of which later keys may change a part
+        if (first := places.setdefault(place, key)) != key:
+            raise InputError("expected different keys", f"{'.'.join(first)} and {'.'.join(key)}, which are one")
     inputs = fingerprints(scene, scene_path.absolute())
     copies = {}
     for body, link in links.items():
@@ -240,10 +243,10 @@ def value_of(data: Node, key: tuple[str, ...], whole: tuple[str, ...] = (), opti
     return value
 
 
-def set_key(data: Node, key: tuple[str, ...], value: Value, whole: tuple[str, ...] = ()) -> None:
+def set_key(data: Node, key: tuple[str, ...], value: Value, whole: tuple[str, ...] = ()) -> object:
     """Set data[key] = value; entries of a list go by their number (from 0), their `name` or their `body`.
 
-    `whole` is what messages call the key, where that is not `key` itself.
+    Returns the place, whatever the key calls it. `whole` is what messages call the key, where that is not `key` itself.
     """
     whole = whole or key
     for part in key[:-1]:
@@ -253,7 +256,8 @@ def set_key(data: Node, key: tuple[str, ...], value: Value, whole: tuple[str, ..
         if not isinstance(inner, dict | list):
             raise InputError(f'--vary: expected a table or a list at "{part}" of "{".".join(whole)}"', f"{inner!r}")
         data = inner
-    data[_index(data, key[-1], whole)] = value  # type: ignore[index]
+    data[last := _index(data, key[-1], whole)] = value  # type: ignore[index]
+    return id(data), last
 
 
 def _index(data: Node, part: str, whole: tuple[str, ...], option: str = "--vary") -> str | int:

@@ -110,6 +110,7 @@ def test_latin_hypercube(ffrobot, short_scene):
         ("links.rod.mesh.element=4,8", 'did you mean "elements"?'),
         ("gravitation=1,2", "with gravitation = 1"),
         ("name.first=1,2", '--vary: expected a table or a list at "name"'),
+        ("body.0.modes,body.crank.modes=1", "found body.0.modes and body.crank.modes, which are one"),
         ("gravity.1,gravity.1=1,2", "expected every key once, found gravity.1 several times"),
     ],
 )  # fmt: skip
