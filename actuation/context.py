@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @struct
 class ActuatedContext(Context):
-    """Context with `patches` and modal bodies of `links` by name, and the equations of links `carrying` payloads."""
+    """Context with `patches`, modal bodies of `links`, and equations of links `carrying` payloads, each by link."""
 
     _: KW_ONLY
     patches: Mapping[str, LinkPatches] = field(default_factory=dict)

@@ -90,9 +90,9 @@ def quasi_static_shift(run: Run, modal: Mapping[str, Array], points: Iterable[st
 def freed_shift(run: Run, modal: Mapping[str, Array], point: str, rows: Indices) -> Array:
     """Return the shift (len(rows), 3), m, of a point at outputs `rows` if motors keep their torques: the robot recoils.
 
-    If `modal` forces (T, n), N/√kg, by body are missing, δq = δq_locked + R γ with Rᵀ M δq = 0, R = ∂q/∂γ of motor
-    angles γ, as inner forces do not change momentum.
+    `modal` forces (T, n), N/√kg, by body are missing; as they are inner forces, momentum does not change.
     """
+    # δq = δq_locked − R γ with Rᵀ M δq = 0
     shift, R = _locked(run, modal, rows)
     MR = mass_matrices(run.model, run.q[rows]) @ R
     gamma = np.linalg.solve(np.swapaxes(R, 1, 2) @ MR, np.einsum("tki,tk->ti", MR, shift)[:, :, None])

@@ -97,7 +97,7 @@ def joint_pid(record: JointPid, setup: Setup) -> LinearFeedback:
 
 
 def modal_velocity(record: ModalVelocity, setup: Setup) -> LinearFeedback:
-    """Make the controller of voltages that damp the lowest modes by forces −2 ζ ω ṗ, with least force on others."""
+    """Make the controller whose voltages damp the lowest modes by forces −2 ζ ω ṗ, with least force on other modes."""
     G = np.zeros((len(setup.inputs), len(setup.outputs)))
     bandwidth = 0.0
     for name in record.bodies:
@@ -133,7 +133,7 @@ def state_feedback(record: StateFeedback, setup: Setup) -> LinearFeedback:
 class ComputedTorqueControl:
     """Torques for joint accelerations γ̈_ref + 2 ζ ω ė + ω² e with rigid links, less the feed-forward.
 
-    e is the error of joint coordinates (Craig, Introduction to Robotics, sec. 10.4).
+    e is the error of joint coordinates, ω bandwidth, ζ damping ratio (Craig, Introduction to Robotics, sec. 10.4).
     """
 
     def __init__(self, record: ComputedTorque, setup: Setup) -> None:

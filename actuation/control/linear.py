@@ -38,7 +38,8 @@ class LinearModels(Details):
     `controllable`: by motors and patches together; `observable`: by joints and points together; `zeros` by
     (inputs, outputs): from each motor to its own joint and to each coordinate of a point, from all motors to their
     joints (the frequencies with locked joints), and to as many coordinates of a point. `suggested`: gains of joint PD
-    controllers for all models and the longest sample time (s) for them. `conditions`: see `joint_conditions`.
+    controllers for all models and the longest sample time (s) for them. `conditions`: modes and compliance with joints
+    "locked", and with motors locked behind "compliant" gears.
     """
 
     models: tuple[LinearModel, ...]
@@ -124,7 +125,7 @@ class Linear(InstantAnalysis):
 
 
 def with_voltages(model: Model, mechanism: LinearMechanism, patches: Mapping[str, LinkPatches]) -> LinearMechanism:
-    """Return the mechanism with inputs "pzt/LAYOUT/k" after its motors: generalized forces of 1 V along s."""
+    """Return the mechanism with inputs "pzt/LAYOUT/k" after its motors: generalized forces of 1 V."""
     found = {name: column for name, column in mechanism.inputs.items() if name.startswith("joint/")}
     for of_link in patches.values():
         along_s = model.modal_directions(of_link.per_volt) @ mechanism.transformation

@@ -146,7 +146,10 @@ class LinearModel(StateSpace):
 
     @cached_property
     def second_order(self) -> tuple[Array, Array, Array, Array]:
-        """K̂ (f, f) rad²/s², D̂ (f, f) 1/s, B̂ (f, inputs) of z̈ + D̂ ż + K̂ z = B̂ u, and ∂y/∂z (outputs, f); SI units."""
+        """K̂, D̂ (f, f), B̂ (f, inputs) of z̈ + D̂ ż + K̂ z = B̂ u in coordinates z of unit mass, and ∂y/∂z (outputs, f).
+
+        K̂ is in rad²/s², D̂ in 1/s, B̂ and ∂y/∂z in SI units.
+        """
         f, L_T, inverse = self.freedom, np.linalg.cholesky(self.mass).T, self.of_unit_mass
         A_K, A_D = L_T @ self.A[f:, :f] @ inverse, L_T @ self.A[f:, f:] @ inverse
         inputs, outputs = L_T @ self.B[f:], self.C[:, :f] @ inverse
@@ -271,7 +274,7 @@ def robot_modes(model: LinearModel) -> RobotModes:
 
 @kept
 def locked_frequencies(model: LinearModel) -> Array:
-    """Return undamped frequencies (k,), Hz, the lowest first, with all motor shafts locked: of NᵀK̂ N with BᵀN = 0."""
+    """Return undamped frequencies (k,), Hz, the lowest first, with all motor shafts locked."""
     K, _, B, _ = model.second_order
     N = free_directions(B[:, model.inputs(model.motors)].T)
     omega = np.sqrt(np.linalg.eigvalsh(N.T @ (K + K.T) @ N / 2).clip(min=0.0))
@@ -291,13 +294,13 @@ class Reachability:
 
 
 def controllability(model: LinearModel, inputs: Names) -> Reachability:
-    """Return controllability by mode, from [λ² I + λ D̂ + K̂, b̂] (Popov–Belevitch–Hautus, second-order equations)."""
+    """Return controllability by mode, by the Popov–Belevitch–Hautus test of second-order equations."""
     _, _, B, _ = model.second_order
     return _reach(model, _scaled(B, model.input_names)[:, model.inputs(inputs)], left=True)
 
 
 def observability(model: LinearModel, outputs: Names) -> Reachability:
-    """Return observability by mode, as `controllability` with the rows of outputs, those of rates times λ."""
+    """Return observability by mode, by the Popov–Belevitch–Hautus test of second-order equations."""
     C = np.vstack([model.of_unit_mass.T @ part.T for part in np.split(model.C, 2, axis=1)])
     return _reach(model, _scaled(C, model.output_names)[:, model.outputs(outputs)], left=False)
 
@@ -352,7 +355,7 @@ RESOLVED = 1e-3  # relative error of zeros by round-off: with more they count as
 
 @struct
 class Zeros:
-    """The finite zeros (k,), 1/s, from inputs to outputs: those on the left first, the slowest of each side.
+    """The finite zeros (k,), 1/s, from inputs to outputs: left of the imaginary axis, on it, then right; each by size.
 
     `unstable`: those with positive real part. Without any the transfer is minimum phase (undamped ones on the imaginary
     axis are allowed).
@@ -378,10 +381,7 @@ class Zeros:
 def zeros(model: LinearModel, inputs: Names, outputs: Names) -> Zeros:
     """Return the zeros from as many inputs as outputs, by name (transmission zeros where more than one).
 
-    While C z = 0 the inputs act as constraint forces: with bases N of C z = 0 and N_B of Bᵀ z = 0, zeros are the
-    eigenvalues of N_Bᵀ (λ² I + λ D̂ + K̂) N. Infinite ones, which QZ scatters, are those whose distance from infinity
-    is within their round-off (G. W. Stewart and J. Sun, Matrix Perturbation Theory, 1990, VI.2). A transfer
-    that is 0, or singular at all s, has none. Raises `InputError` unless both have the same number.
+    A transfer that is 0, or singular everywhere, has none. Raises `InputError` unless both have the same number.
     """
     K, D, B, C = model.second_order
     b, c = B[:, model.inputs(inputs)], C[model.outputs(outputs)]
@@ -399,6 +399,7 @@ def zeros(model: LinearModel, inputs: Names, outputs: Names) -> Zeros:
     peers = [k for k, name in enumerate(model.output_names) if name.partition("/")[0] in kinds]
     if weakest * np.abs(s) ** 2 <= STILL * np.linalg.norm(C[peers], axis=1).max(initial=0.0) * np.linalg.norm(b):
         return Zeros(np.zeros(0, dtype=complex), np.zeros(0, dtype=complex))
+    # While C z = 0 the inputs act as constraint forces: zeros are eigenvalues of N_Bᵀ (λ² I + λ D̂ + K̂) N
     N, N_B = free_directions(c), free_directions(b.T)
     mass, damping, stiffness = N_B.T @ N, N_B.T @ D @ N / scale, N_B.T @ K @ N / scale**2
     values, errors = _eigenvalues(mass, damping, stiffness)
@@ -440,6 +441,7 @@ def _finite(A: Array, E: Array, largest: float) -> tuple[ComplexArray, Array]:
     """Eigenvalues of A − λ E that round-off tells from infinity, and their errors: chordal ones, times 1 + |λ|².
 
     Those below 1 are far from infinity, though errors of double ones (a free body's, at 0) are estimated without bound.
+    See G. W. Stewart and J. Sun, Matrix Perturbation Theory, 1990, VI.2.
     """
     (alpha, beta), left, right = scipy.linalg.eig(A, E, left=True, homogeneous_eigvals=True)
     finite = np.abs(alpha) < largest * np.abs(beta)

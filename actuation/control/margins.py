@@ -118,7 +118,8 @@ def lowest_frequency(
     """Return the lowest frequency of the robot with controlled or locked joints, Hz; NaN if nothing vibrates.
 
     It is the lowest with locked motors and, if PID controllers alone drive joints, of the sampled loop (sample time T,
-    `delay` of commands, s) with damping ratios below `LIGHTLY`. With other controllers it is half of the first.
+    `delay` of commands, s) with damping ratios below `LIGHTLY`. With other controllers it is
+    half of that with locked motors.
     """
     locked = min((float(locked_frequencies(model).min(initial=np.inf)) for model in models), default=np.inf)
     pids = [record for record in controllers if isinstance(record, JointPid)]
@@ -293,7 +294,8 @@ def suggested_gains(
 def unhurried_gains(models: Sequence[LinearModel]) -> tuple[Suggestion, float] | None:
     """Return gains for a third of the lowest frequency with locked motors, and the longest sample time (s) for them.
 
-    Of a 1-2-5 series from 10 ms down to 10 µs, without delay; None if the robot does not bend, or no gains are found.
+    It is of a 1-2-5 series from 10 ms down to 10 µs, without delay; None if the robot does not bend, or no
+    gains are found.
     """
     lowest = min(locked_frequencies(model).min(initial=np.inf) for model in models)
     for T in SAMPLE_TIMES if np.isfinite(lowest) else ():
@@ -305,7 +307,7 @@ def unhurried_gains(models: Sequence[LinearModel]) -> tuple[Suggestion, float] |
 def light_roots(models: Sequence[LinearModel]) -> list[str]:
     """Return joints where a torque first turns the root of a bending link, which has hardly any inertia, not the link.
 
-    There 1/(c M⁻¹ b), of the joint's input b and output c, is small against the inertia with rigid links.
+    The inertia that a sudden torque accelerates is small there against that with rigid links.
     """
     found: dict[str, None] = {}
     for model in models:

@@ -93,8 +93,9 @@ class LoopMotion:
 def ringing(time: Array, place: Array, lowest: float) -> tuple[float, float]:
     """Return about which frequency (Hz) vibration is measured, and how long (s) before the end of `time` (T,), s.
 
-    `PERIODS` of the frequency `lowest`, Hz, within the time for which the `place` (T, d), m, of the tip rests, or in
-    half of a run without rest. If these (at rest `LEAST_PERIODS`) do not fit, the frequency is higher.
+    The frequency is `lowest`, Hz, the time `PERIODS` of its periods, at most that for which the `place` (T, d), m, of
+    the tip rests, or half of a run without rest. Where fewer periods fit (at rest: than `LEAST_PERIODS`), the frequency
+    is higher.
     """
     whole = float(time[-1] - time[0])
     way = np.linalg.norm(place - place[-1], axis=1)

@@ -378,7 +378,7 @@ def kalman_filters(
 ) -> tuple[Schedule, list[str]]:
     """Return filters along the path that estimate readings of `more`, and warnings of modes that `sensors` cannot see.
 
-    Raises `InputError` as `kalman` does.
+    Raises `InputError` where no filter exists: see `kalman`.
     """
     robot, source, T = setup.robot, setup.source, setup.sample_time
     read, estimated = (make_signals(robot.plant, context, of) for of in (sensors, more))

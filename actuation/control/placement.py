@@ -85,7 +85,7 @@ class Placed(Details):
 def locked_modes(model: LinearModel, link: PatchableLink, count: int) -> tuple[Array, Array, Array]:
     """Return the lowest `count` modes of the robot, motors locked, in which the link bends.
 
-    Frequencies (modes,), Hz, shapes (modes, m) on p, and the share (modes,) of the strain energy in the link.
+    Frequencies (modes,), Hz, shapes (modes, m) in the link's p, and the share (modes,) of strain energy in it.
     """
     f = model.freedom
     modal = [i for i, name in enumerate(model.state_names[:f]) if name.startswith("modal/")]

@@ -299,7 +299,7 @@ class Lqr(ControllerRecord):
     """u = −K x for the sampled linear model about the reference.
 
     Weights are inverse squares of acceptable errors. With patches alone as `inputs`, a "joint-pid" controls the joints.
-    States as in `ModalVelocity`.
+    Modal coordinates are estimated from voltages as in `ModalVelocity`, or ideal.
     """
 
     kind: Literal["lqr"]

@@ -334,5 +334,5 @@ class Setup:
         return self.places(*self.robot.patches[body].inputs)
 
     def modal_columns(self, body: str, m: int, ending: str = "/rate") -> Indices:
-        """Return indices (m,) in y of the lowest m modal coordinates of a body, or of their rates."""
+        """Return indices (m,) in y of the lowest m modal rates of a body, or of coordinates for an empty `ending`."""
         return self.columns(*(f"modal/{body}/{k}{ending}" for k in range(1, m + 1)))

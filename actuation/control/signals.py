@@ -93,8 +93,7 @@ class Sensing:
     def rows(self, about: LinearMechanism) -> tuple[Array, Array, Array]:
         """Return derivatives (signals, f) of readings by s, ṡ and s̈, SI units, for a linear mechanism of the same tree.
 
-        Exact of coordinates; of points by differences, to 1e-11. While loops move, the change of their ∂q/∂s counts
-        once, not its rate.
+        Exact of coordinates; of points by differences, to 1e-11. In moving loops the second rate of ∂q/∂s is left out.
         """
         n_v = self._tree.n_v
         H, H_dot = about.transformation[:n_v], about.transformation_rate[:n_v]

@@ -76,8 +76,8 @@ def composite(placed: Sequence[PlacedLayout], body: ModalBody) -> tuple[Array, A
     """Return the mutual effects of the k patches of all layouts and their link, over n modes of the modal body.
 
     These are the stiffness (n, n), rad²/s², that patches add; modal forces per volt (k, n), N/(√kg·V), by which the
-    layers' stiffness reduces those on a straight link; and what residual strains add to capacitances (k, k), F:
-    0 where rigidities are not known.
+    layers' stiffness reduces those on a straight link; and what strains that modes lack add to capacitances (k, k),
+    F: 0 where rigidities are not known.
     """
     layers = layers_on_link(placed, body)
     stiffness, per_volt = layers.B.T @ layers.by_modes, layers.by_volts.T @ layers.B
@@ -100,11 +100,11 @@ def section_loads(placed: PlacedLayout, body: ModalBody, p: Array, voltages: Arr
 
 
 class LayersOnLink(NamedTuple):
-    """Layers of k patches on their link with n modes: for each Gauss point a row for each strain that interacts.
+    """Layers of k patches on a link with n modes; each row is one strain, which the patches affect, at a Gauss point.
 
-    B (rows, n): strains of the modes, SI. Loads times weights of points are P = `by_volts` (rows, k) V − `by_modes`
-    (rows, n) p, N·m² and N·m; on a straight link `straight` (rows, k) V. `yielding` (k, k): what residual strains,
-    which modes lack, add to capacitances, F.
+    B (rows, n): strains of the modes, SI. Under voltages V, layers load a link bent by p with `by_volts` (rows, k) V −
+    `by_modes` (rows, n) p, and a straight one with `straight` (rows, k) V, N·m² and N·m: loads times weights of the
+    points. `yielding` (k, k): what strains that modes lack add to capacitances, F.
     """
 
     points: list[GaussPoint]
@@ -188,16 +188,16 @@ def gauss_points(body: ModalBody, intervals: Array) -> Iterator[GaussPoint]:
 def place_of(layout: PztLayout, sections: LinkSections, station: int) -> tuple[float, float]:
     """Return the link's extent along the normal of its patches (m), see `LinkSections.extent`, and β at a station.
 
-    β is `LinkSections.shear_lever`, without unit; 0 where the layers carry no shear.
+    β, see `LinkSections.shear_lever`, is shear per twist and distance; 0 where the layers carry no shear.
     """
     lever = sections.shear_lever(station, layout.normal, layout.width) if layout.lamina.shears else 0.0
     return float(sections.extent(layout.normal, side(layout))[station]), lever
 
 
 def felt_loads(layout: PztLayout, sections: LinkSections, station: int) -> tuple[Array, Array]:
-    """Return C (4, 4) and f (4,), SI, of `layer_loads` for strains e_f that interact with patches; others, d, are free.
+    """Return stiffness C (4, 4) and loads per volt f (4,), SI, of the layers by strains that interact with patches.
 
-    Link and layers carry no load along d: e_d = (C_l + C)_dd⁻¹ (f_d V − C_df e_f) is eliminated, with 0 in C and f.
+    Other strains are eliminated, as link and layers carry no load along them; C and f are 0 there.
     """
     every, of_volt = layer_loads(layout, *place_of(layout, sections, station))
     felt = felt_rows(layout)
@@ -252,7 +252,7 @@ class Effects(NamedTuple):
     Attributes:
         extent: (k,) t_b, mean extent of the link along the normal under each patch, m: see `LinkSections.extent`.
         per_volt: (k,) c, load along the strain that each patch actuates, N·m/V.
-        lever: (k,) strain of the surface per curvature and distance: 1; of its diagonals per twist: β/2.
+        lever: (k,) strain of the surface per curvature and distance: 1; of diagonals per twist: β/2, see `place_of`.
         turn: (k, n) rotation of the sections at the ends of a patch against each other, in its sense, rad/(m·√kg).
         Phi_V: (k, n) modal forces per volt, N/(√kg·V), reduced by the stiffness of the layers.
         capacitance: (k, K) charges, F, as sensors by voltages of the K patches of the link; open ones are clamped, but
@@ -391,7 +391,7 @@ PASSES = 6  # until modes and the stiffness of shunts at their frequencies agree
 
 @struct
 class StructureEffect:
-    """Changes of a link by patches, bare → with patches.
+    """Properties of a link, each first bare, then with patches.
 
     Attributes:
         mass: (2,) kg.
@@ -408,7 +408,7 @@ def patched_body(spatial: Body, body: ModalBody, placed: Sequence[PlacedLayout])
     """Add mass and stiffness of patches to a link or a piece of it, by the key `structural`; all modes are kept.
 
     Mass lies in the plane of the patches' normal at their offset from the axis, with its moment of inertia about the
-    line that it is on, ∫ρ (η² + ζ²) dA. The stiffness is that of the `composite` section.
+    line that it is on. The stiffness is that of the `composite` section.
     """
     T, sections = spatial.modal_transform, link_sections(body)
     points, masses, spins = [], [], []
@@ -458,7 +458,7 @@ def _with_charges(patched: Body, body: ModalBody, placed: Sequence[PlacedLayout]
 
 
 def structure_effect_of(bare: Body, patched: Body) -> StructureEffect:
-    """Return the changes of a link by its patches."""
+    """Return mass, moment of inertia and frequencies of a link without and with patches."""
     pair = (bare, patched)
     return StructureEffect(
         np.array([body.mass for body in pair]),

@@ -302,10 +302,10 @@ def _key(path: Path, label: str) -> str:
 
 
 def on_kept_modes(of_link: LinkPatches, equations: Body) -> LinkPatches:
-    """Return the patches of a link whose `equations` may have fewer modes than its file; the same if they serve all.
+    """Return the patches of a link for its `equations`, which may have fewer modes than its file.
 
-    Modal forces on modes left out follow from the loads on the link. Patches that cannot produce all of these produce
-    those on the coordinates that are kept, and may bend the link in the others.
+    They are unchanged with all modes, or if they can produce all modal forces. Else they produce those on coordinates
+    of the equations, and may bend the link in the modes left out.
     """
     if equations.reduction is None or of_link.reach.serves_all:
         return of_link

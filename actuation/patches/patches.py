@@ -44,7 +44,7 @@ class ReachedModes:
     served: int
 
     def forces(self, F_p: Array) -> Array:
-        """Return modal forces (T, m), N/√kg, on p', or other rows linear in modes, by those (T, n) of the body."""
+        """Return modal forces (T, m), N/√kg, on p' from those (T, n) of the body; or other derivatives by modes."""
         return F_p[:, self.rows] @ self.T
 
     def coordinates(self, p: Array) -> Array:
@@ -96,7 +96,10 @@ class Reach:
 
 
 def served_first(served: int, n: int, patches: int) -> Array:
-    """Return roots of weights (rows, n) that prefer the first `served` of n modes; spare patches serve the others."""
+    """Return roots of weights (rows, n) that prefer the first `served` of n modes.
+
+    Other modes have weights only if there are more `patches`.
+    """
     rows = n if patches > served else served
     return np.diag(np.where(np.arange(n) < served, 1.0, OF_STATIC_SHAPES))[:rows]
 
@@ -246,7 +249,7 @@ class PatchArray(Reach):
 
     @property
     def stiffness_ratio(self) -> Array:
-        """Stiffness ratio ψ (k,) of link to patch."""
+        """Axial stiffness of the link over that of each patch, ψ (k,)."""
         return self._stiffness[0]
 
     @property
@@ -256,7 +259,7 @@ class PatchArray(Reach):
 
     @property
     def stiffness_in_words(self) -> str:
-        """Text with ψ and the authority, and on whether the equations have the stiffness of the patches."""
+        """Text with the stiffness ratio and authority, and whether the equations have the stiffness of patches."""
         if not np.isfinite(self.authority).all():
             unknown = "stiffness ratio ψ not known: the modal body has no rigidities"
             return f"{self.layout.label}: {unknown}; with few modes patches stiffen the link too little"

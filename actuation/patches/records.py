@@ -103,8 +103,8 @@ def plain_lamina(
 ) -> Lamina:
     """Lamina of a ceramic isotropic in its plane: `modulus` (Pa), `d31` (m/V), electrodes `thickness` (m) apart.
 
-    Its free strain is alike in all directions: it never shears. Free across (σ_s = 0): E = 1/s_11 and E d31. With
-    ν = −s_12/s_11 `held` across (ε_s = 0): E/(1 − ν²) and d31/(s_11 + s_12) = E d31/(1 − ν). A link that stands still
+    Its free strain is alike in all directions: it never shears. Free across the link, its constants are E and
+    E d31; `held` across (ε_s = 0), with Poisson's ratio `nu`, E/(1 − ν²) and E d31/(1 − ν). A link that stands still
     holds it in both directions.
     """
     ratio, stress = nu or 0.0, modulus * d31 / thickness

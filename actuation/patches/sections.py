@@ -131,9 +131,9 @@ def check_width(key: str, body: ModalBody, layout: PztLayout, edges: Array) -> N
 
 
 def potentials(body: ModalBody, x: Array) -> Array:
-    """Return φ_z, u, φ_x, −φ_y (m, 4, n) of n modes at x (m,), m: rad and m per m·√kg.
+    """Return rotations and displacement φ_z, u, φ_x, −φ_y (m, 4, n) of n modes at x (m,), m: rad and m per m·√kg.
 
-    Their differences are the integrals of the strains e along x.
+    Their derivatives by x are the strains.
     """
     _, translation, rotation = body.along_axis(x)
     return np.stack([rotation[:, 2], translation[:, 0], rotation[:, 0], -rotation[:, 1]], axis=1)
@@ -181,10 +181,10 @@ def layer_section(layout: PztLayout, extent: float) -> tuple[float, float, float
 def layer_loads(layout: PztLayout, extent: float, lever: float) -> tuple[Array, Array]:
     """Return C (4, 4), f (4,) of loads P = f V − C e, N·m and N, of the layers by strains e = (φ_z', u', φ_x', −φ_y').
 
-    The link has `extent` t_b (m) along their normal; `lever` is β. Along the strain that they actuate, f of plain
-    ceramic on one face is E_p d31 w_p N (t_b + N t_p)/2 N·m/V, the sum of the layers' arms t_b/2 + (i − ½) t_p (one:
-    Eq. 14 of Shabana 2022). Both faces double it; twist has the shear force per width
-    of a volt, times β, in place of E_p d31.
+    The link has `extent` t_b (m) along their normal; `lever` is β of `LinkSections.shear_lever`. Along the strain that
+    they actuate, f of plain ceramic on one face is E_p d31 w_p times the sum of the layers' arms t_b/2 + (i − ½) t_p
+    (one: Eq. 14 of Shabana 2022), N·m/V. Both faces double it; twist has the shear force per width of a volt, times β,
+    in place of E_p d31.
     """
     A, S, I = layer_section(layout, extent)  # noqa: E741
     sign, middle, w = np.sign(S), layout.offset, layout.width
@@ -207,7 +207,7 @@ def layer_loads(layout: PztLayout, extent: float, lever: float) -> tuple[Array, 
 
 
 def straight_loads(layout: PztLayout, extent: float, lever: float) -> Array:
-    """Return f (4,), N·m/V and N/V, of `layer_loads`, 0 along strains that do not interact with patches."""
+    """Return loads per volt (4,), N·m/V and N/V, of layers on a straight link; 0 along strains they do not affect."""
     f = np.zeros(4)
     rows = felt_rows(layout)
     f[rows] = layer_loads(layout, extent, lever)[1][rows]
