@@ -258,11 +258,11 @@ class JointRecord(Record):
         return self.turned_around(rate)
 
     def state(self, coordinates: Array) -> Array:
-        """Return q (q_count,) of the core, rad or m, from `coordinates` as the scene has them."""
+        """Return q (q_count,) of the core, rad or m, from `coordinates` (k,) as the scene has them."""
         return coordinates
 
     def velocity(self, rates: Array) -> Array:
-        """Return v (freedoms,) of the core, rad/s or m/s, from `rates` as the scene has them."""
+        """Return v (freedoms,) of the core, rad/s or m/s, from `rates` (k,) as the scene has them."""
         return self.state(rates)
 
     def coordinates(self, q: Array) -> Array:
@@ -297,7 +297,7 @@ class JointRecord(Record):
 
     @property
     def asks_for_coordinate(self) -> tuple[str, ...]:
-        """Keys that need a coordinate, so that no loop is cut here: motor without a rotor, spring with one."""
+        """Keys that need a coordinate, so that no loop is cut here: motor without rotor, spring with rotor."""
         keys = ("stiffness",) if getattr(self, "rotor_inertia", 0.0) else ("motor",)
         return tuple(key for key in keys if getattr(self, key, None))
 

@@ -71,7 +71,7 @@ class Played:
         self._of, self._z = of, np.zeros_like(of.weights)
 
     def at(self, V: Array, last: Array | None = None) -> Array:
-        """Return effective voltages (k,), V, at V (k,), V, on the way to the `last` (k,)."""
+        """Return effective voltages (k,) at V (k,), V, then move the state on to `last` (k,), V; None: to V."""
         output = self._of.acting(self._of.plays(self._z, V))
         self._z = self._of.plays(self._z, V if last is None else last)
         return output

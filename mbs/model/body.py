@@ -176,7 +176,7 @@ class Body(Invariants):
 
     @property
     def inertia(self) -> Array:
-        """Inertia tensor J0 (3, 3) about the origin of the frame, kg·m²: tr(J2) 1 − J2, and J_s of a line of mass."""
+        """Inertia tensor J0 (3, 3) about the origin of the frame, kg·m²."""
         J: Array = np.trace(self.second_moment) * np.eye(3) - self.second_moment
         J[0, 0] += self.J_spin
         return J
@@ -188,19 +188,19 @@ class Body(Invariants):
 
     @property
     def inertia_slope(self) -> Array:
-        """J1 (3, 3, n), √kg·m, change of the inertia tensor by modes: J1_ij = 2δ_ij tr Ī − Ī_ij − Ī_ji."""
+        """J1 (3, 3, n), √kg·m, change of the inertia tensor by modes."""
         return 2 * np.einsum("ij,kkn->ijn", np.eye(3), self.I_bar) - self.I_bar - self.I_bar.transpose(1, 0, 2)
 
     @property
     def spin(self) -> Array:
-        """h0 (3, n), √kg·m, angular momentum by modal rates: h0_a = ε_abc Ī_bc, and h_s of a line of mass."""
+        """h0 (3, n), √kg·m, angular momentum by modal rates of the undeformed body."""
         h: Array = np.einsum("abc,bcn->an", LEVI_CIVITA, self.I_bar)
         h[0] += self.h_spin
         return h
 
     @property
     def spin_slope(self) -> Array:
-        """H (3, n, n), skew, without unit: H_a = ε_abc S̄_bc, so that h_a(p) = h0_a + pᵀH_a."""
+        """H (3, n, n), skew, without unit: change of `spin` by deformation, h_a(p) = h0_a + pᵀH_a."""
         S: Array = self.S_bar_kl
         return np.array([S[1, 2] - S[2, 1], S[2, 0] - S[0, 2], S[0, 1] - S[1, 0]])
 

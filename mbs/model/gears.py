@@ -122,7 +122,7 @@ def resistance(model: Model, q: Array, v: Array) -> Array:
 
 
 def friction_damping(model: Model, q: Array, *, is_at_rest: bool = False) -> Array:
-    """Return the damping matrix (n_v, n_v), N·m·s/rad or N·s/m, of friction at q (n_q,), as `Friction.damping`."""
+    """Return the damping matrix (n_v, n_v), N·m·s/rad or N·s/m, at q (n_q,): viscous, at rest also dry friction."""
     D = model.along_cut.damping(q, is_at_rest=is_at_rest)
     for column, friction in _frictions(model.tree):
         D[column, column] += friction.damping(is_at_rest=is_at_rest)

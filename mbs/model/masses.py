@@ -40,11 +40,12 @@ UNCOUPLED = 1e-12  # of the geometric mean of two modes' own terms: what couples
 def with_payload(body: Body, point: str, mass: float, center: Array, inertia: Array) -> Body:
     """Add a mass (kg) rigidly attached to a section of the body; `center` (3,), m, in the body's axes.
 
-    `inertia` J (3, 3) in kg·m² about that center: ∫ρ ξ ξᵀ dV = E = ½ tr(J) I − J.
+    `inertia` (3, 3) is in kg·m² about that center.
     """
     at = body.points[point]
     x, phi = at.position + center, at.rotation
     Phi = at.translation - skew(center) @ phi
+    # ∫ρ ξ ξᵀ dV
     E = 0.5 * np.trace(inertia) * np.eye(3) - inertia
     added = attached_integrals(mass, x, E, Phi, phi)
     # J about the center counts as it is, however far the section turns: see `Stiffening.S_turned`
@@ -59,7 +60,7 @@ def with_payload(body: Body, point: str, mass: float, center: Array, inertia: Ar
 def with_line_masses(body: Body, points: Sequence[BodyPoint], masses: Array, spins: Array, stiffness: Array) -> Body:
     """Add masses (k,), kg, at sections `points` near the body's axis, and stiffness (n, n), rad²/s², of strips on it.
 
-    They have moments of inertia `spins` (k,), kg·m², about the axis alone, as a line of mass has: J_s, h_s, S_s.
+    They have moments of inertia `spins` (k,), kg·m², about the axis alone.
     """
     m_ff, loaded = np.eye(body.n_modes), body
     for at, mass, spin in zip(points, masses, spins, strict=True):

@@ -63,7 +63,7 @@ class Constraints(Kinematics):
         return {owner: against[:, [other == owner for other in owners]].any(axis=1) for owner in owners}
 
     def posture(self, q: Array, t: float, locked: Booleans | None = None) -> Array | None:
-        """Project q (n_q,), SI, onto C(q, t) = 0 at t (s), as `postures`; None without convergence."""
+        """Project q (n_q,), SI, onto C(q, t) = 0 at t (s), joints `locked` (n_v,) stay; None without convergence."""
         solved, is_met = self.postures(q[None], np.array([t]), locked)
         return solved[0] if is_met[0] else None
 
@@ -199,7 +199,7 @@ class Model:
 
     @cached_property
     def row_sizes(self) -> Array:
-        """Natural sizes (rows,) of C: 1 rad, or the robot's size, m."""
+        """Natural sizes (rows,) of the constraint equations: 1 rad, or the robot's size, m."""
         return np.array([self.size if self.measures_way(row) else 1.0 for row in self.rows])
 
     @cached_property

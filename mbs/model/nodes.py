@@ -27,7 +27,7 @@ class Section(NamedTuple):
     still: bool = False
 
     def turned(self, rotation: Array) -> Array:
-        """Return the rotation (…, 3, n), any unit, of the triad from that of the section: without z if `still`."""
+        """Return the triad's `rotation` (…, 3, n), any unit, from the section's: without that about z if `still`."""
         if not self.still:
             return rotation
         z = self.triad[:, 2]

@@ -293,12 +293,12 @@ class SplitForces(NamedTuple):
     """Motor torques, modal forces and multipliers of loops that supply wanted generalized forces."""
 
     moments: dict[str, Array]  # τ (T, k), N·m or N, by joint
-    left: Array  # EᵀF_p (T, n_v), N/√kg
-    loops: Array  # λ_c (T, constraint equations of loops), N or N·m
+    left: Array  # modal forces (T, n_v), N/√kg, along modes
+    loops: Array  # multipliers (T, constraint equations of loops), N or N·m
 
 
 def split_forces(model: Model, q: Array, wanted: Array) -> SplitForces:
-    """Solve Gᵀτ + EᵀF_p − C_cᵀλ_c = `wanted` (T, n_v), SI, at q (T, n_q) for torques, modal and loop forces."""
+    """Find motor torques, modal and loop forces that together are `wanted` (T, n_v), SI, at q (T, n_q)."""
     tau, left, multipliers = driven_mechanism(model).split(q, wanted)
     return SplitForces(model.by_motor(tau), left, multipliers)
 
@@ -321,10 +321,7 @@ class FrameShare(NamedTuple):
 
 
 def frame_share(model: Model, joint: str, q: Array) -> FrameShare:
-    """Return modal forces per torque of a revolute joint's motor on the outer body at q (n_q,): theory.md, Eq. 30.
-
-    They are ∓Φ_rᵀ J_l(φ) z of the outer (upper sign) and inner section, z the axis, φ = Φ_r p, J_l the left Jacobian.
-    """
+    """Return modal forces per torque of a revolute joint's motor on the outer body at q (n_q,): theory.md, Eq. 30."""
     tree = model.tree
     direction, slope = np.zeros(tree.n_v), np.zeros((tree.n_v, tree.n_v))
     node = tree.nodes[tree.carried[joint]]
@@ -339,7 +336,7 @@ def frame_share(model: Model, joint: str, q: Array) -> FrameShare:
 
 
 def turning_motors(model: Model) -> list[str]:
-    """Return names of joints with one angle, between sections, whose motors turn the frames of bodies instead."""
+    """Return names of joints whose one angle is between sections, but whose motors turn the frames of bodies."""
     if model.scene.motors != "frame":
         return []
     tree = model.tree

@@ -160,7 +160,7 @@ class KinematicTree:
         return is_joint
 
     def at_rest(self, guesses: Mapping[str, Array]) -> Array:
-        """Return q (n_q,) of undeformed links; joints have `guesses` by name in the scene's order, rad or m, else 0."""
+        """Return q (n_q,) of undeformed links; joints have `guesses` (k,) by name in scene order, rad or m, else 0."""
         q = np.zeros(self.n_q)
         for node in self.nodes:
             numbers = len(node.joint.guess_units or node.joint.units)
@@ -212,7 +212,7 @@ class CutCoordinate(NamedTuple):
 
 
 def with_auxiliary_rotors(tree: KinematicTree) -> tuple[KinematicTree, list[ConstraintRow]]:
-    """Return the tree with outputs of rotors on first sides of cut joints, and equations by which they follow these."""
+    """Return the tree with rotors' outputs on first sides of cut joints, and equations to follow these joints."""
     cut = [joint for joint in tree.loops if getattr(joint, "rotor_inertia", 0.0)]
     rows = [cut_row(tree, joint) for joint in cut]
     longer = tree.with_outputs([(joint, f"{joint.name}/rotor", row.a) for joint, row in zip(cut, rows, strict=True)])
@@ -232,7 +232,7 @@ def cut_coordinates(scene: MechanismScene, tree: KinematicTree) -> Iterator[CutC
 
 
 def cut_row(tree: KinematicTree, joint: JointRecord, number: int = 0) -> ConstraintRow:
-    """Return the equation that measures its `sign` times coordinate `number` of a cut joint, second side on first."""
+    """Return the equation of coordinate `number` of a cut joint, second side on first, times the equation's `sign`."""
     along = joint.along[number]
     sides = tree.sides(joint)
     if joint.name in tree.on_frames:
@@ -303,7 +303,7 @@ class AlongCut:
         return force
 
     def damping(self, q: Array, *, is_at_rest: bool) -> Array:
-        """Return the damping matrix (n_v, n_v), N·m·s/rad or N·s/m, of friction at q (n_q,), as `Friction.damping`."""
+        """Return the damping matrix (n_v, n_v), N·m·s/rad or N·s/m, at q (n_q,): viscous, at rest also dry friction."""
         D = np.zeros((self._n_v, self._n_v))
         gradients = self.measured(q[None])[1][0] if self._rough else D
         for k in self._rough:
