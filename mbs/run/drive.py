@@ -443,8 +443,7 @@ def _too_far_bent(system: MultibodySystem, at: State) -> str:
 
 def _loads(system: MultibodySystem) -> Iterator[tuple[str, TimeFunction]]:
     for load in system.model.scene.load:
-        for name, size in load.components.items():
-            component = name.removesuffix("[0]") if len(load.moments) == 1 else name
+        for component, size in load.components.items():
             yield f'load on "{load.point or load.joint or load.pzt}", {component},', size
 
 

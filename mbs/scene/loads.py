@@ -61,11 +61,12 @@ class Load(Referring):
 
     @property
     def components(self) -> dict[str, TimeFunction]:
-        """The given functions of time by component; of joints "moment[k]", of voltages "voltage[k]"."""
+        """The given functions of time by component; of lists "moment[k]", of voltages "voltage[k]"."""
         if self.point is not None and self.moments:  # in the plane: about its normal
             return given_in(self, ("x", "y")) | {"mz": self.moments[0]}
         voltages = {f"voltage[{k}]": function for k, function in enumerate(self.voltage or ())}
-        moments = {f"moment[{k}]": function for k, function in enumerate(self.moments)}
+        key = "moment[{}]" if isinstance(self.moment, tuple) else "moment"
+        moments = {key.format(k): function for k, function in enumerate(self.moments)}
         return given_in(self, OF_POINT) | moments | voltages
 
     @property

@@ -189,6 +189,7 @@ MISTAKES = [
     ("1.5*cos(", "1.5*csh(", 'trajectory "tip": x: expected an expression in t, found', "at character 5 (did you mean"),
     ("1.5*cos(pi*t/4)", "1/(t - 0.25)", 'trajectory "tip": x: expected a finite value', "found none at t = 0.25 s"),
     ("1.5*cos(pi*t/4)", "sqrt(t)", 'trajectory "tip": x: expected a finite velocity', "found none at t = 0 s"),
+    ('pzt = "link1"\nvoltage = ["10*t", 5]', 'joint = "O"\nmoment = "1/(t - 0.25)"', "load no. 1: moment: expected a finite value", "at t = 0.25 s"),
     ('point = "link2.tip"', 'point = "link2.tip"\njoint = "O"', 'trajectory "tip": expected exactly one', '"point", "joint"'),
     ('point = "link2.tip"', 'joint = "O"', 'trajectory "tip": expected the keys "value", "waypoints", "via" with "joint"', '"x", "y"'),
     (TIP, 'joint = "W"\nvalue = "t"', 'trajectory "tip": joint: expected a joint that moves', 'found "W", a weld'),
