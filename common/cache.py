@@ -52,7 +52,7 @@ def _warn(place: Path, problem: str) -> None:
 
 @cache
 def own_folder(*names: str) -> Path:
-    """Return the temporary folder for `names` of this process, which is deleted when that ends."""
+    """Return this process's temporary folder for `names`, deleted when the process ends."""
     own = tempfile.mkdtemp(prefix=f"ffrobot-{'-'.join(names[:1])}-")
     atexit.register(shutil.rmtree, own, ignore_errors=True)
     return Path(own)

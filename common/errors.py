@@ -107,7 +107,7 @@ def refuse(lines: Iterable[str], where: object = "") -> None:
 
 @contextmanager
 def naming(where: object) -> Iterator[None]:
-    """Context that puts `where` (file and key) before each line of an `InputError`, unless it begins with it."""
+    """Context that puts `where` (file and key) before each line of an `InputError`, unless its text begins so."""
     try:
         yield
     except InputError as error:

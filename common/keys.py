@@ -28,7 +28,7 @@ def check_title(value: str, most: int = LONGEST_NAME) -> str:
 
 
 def check_name(value: str) -> str:
-    """Return `value`. Raises `ValueError` as `check_title`, and for "/", "." and blanks around it."""
+    """Return `value`. Raises `ValueError` if it is no title (`check_title`), and for "/", "." and blanks around it."""
     if not value or value != value.strip() or "/" in value or "." in value:
         raise ValueError(f'expected a name without "/", "." and blanks around it, found "{shown(value)}"')
     return check_title(value)

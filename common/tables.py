@@ -80,7 +80,10 @@ def _is_formula(cell: object) -> bool:
 
 
 def key_path(loc: Sequence[int | str], data: dict[str, Any], kind: str = "missing") -> str:
-    """Name for messages, `body "link1": rigid.mass`, of ("body", 0, "rigid", "mass"): of the parts in `data`."""
+    """Name for messages, `body "link1": rigid.mass`, of ("body", 0, "rigid", "mass"): of the parts in `data`.
+
+    With `kind` "missing" the last part counts even where `data` lacks it.
+    """
     path = ""
     here: Any = data
     for k, part in enumerate(loc):

@@ -126,7 +126,7 @@ class Sets:
         self.members.setdefault(name.upper(), []).extend(entries)
 
     def read(self, keyword: Keyword, name: str) -> None:
-        """Add the members that data lines of *NSET or *ELSET list."""
+        """Add to the set `name` what data lines of *NSET or *ELSET list."""
         instance = keyword.options.get("INSTANCE", "").upper()
         if "GENERATE" not in keyword.options:
             self.add(name, ((instance, entry, place) for row, place in keyword.rows() for entry in row if entry))
@@ -138,9 +138,9 @@ class Sets:
             self.add(name, ((instance, number, place) for number in range(first, last + (step > 0) - (step < 0), step)))
 
     def numbers(self, name: str, within: tuple[str, ...] = ()) -> Iterator[tuple[str, int, str]]:
-        """Yield (instance, number, place) of the members of a set, including those of nested sets.
+        """Yield (instance, number, place for messages) of the members of a set, including those of nested sets.
 
-        Raises `InputError` for a set in it that is missing or contains itself.
+        `within`: sets that contain it. Raises `InputError` for a set in it that is missing or contains itself.
         """
         for instance, entry, place in self.members[name]:
             if isinstance(entry, int):
@@ -151,7 +151,10 @@ class Sets:
                 yield instance or of, number, place
 
     def meant(self, entry: str, place: str, within: tuple[str, ...] = ()) -> Iterator[tuple[str, int, str]]:
-        """Yield members as `numbers` for an `entry` NUMBER, INSTANCE.NUMBER, SET or INSTANCE.SET; errors likewise."""
+        """Yield (instance, number, place) of what an `entry` NUMBER, INSTANCE.NUMBER, SET or INSTANCE.SET means.
+
+        Raises `InputError`, with the entry's `place`, for an unknown set, or one `within` which it is.
+        """
         name = entry.strip("\"'").upper()
         of, _, short = name.rpartition(".")
         if short.isdigit():

@@ -39,7 +39,7 @@ class Surface:
     points: Array  # (p, 3) in m; the order does not depend on the number of processes
     triangles: Integers  # (t, 3) rows of `points`, counter-clockwise seen from outside
     edges: Integers  # (e, 2) rows of `points`: the borders of the facets, of which triangles may be a finer division
-    rows: Integers  # (k,) numbers of the points where this process does so; each point belongs to one process
+    rows: Integers  # (k,) numbers of the points that this process evaluates; each belongs to one process
     cells: Integers  # (k,) local cell of each of these points
     X: Array  # (k, 3) their reference coordinates in it
 
