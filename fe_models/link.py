@@ -273,7 +273,7 @@ def _digest(record: Mapping[str, Any]) -> str:
 
 
 def restated(body: ModalBody, link: Link) -> ModalBody | None:
-    """Derive the modal body of `link` from `body`, one with the same modes; None where this lacks requested data."""
+    """Derive the modal body of `link` from `body`, one with the same modes; None where `body` lacks requested data."""
     body = as_computed(body)
     if isinstance(link, BeamLink):  # stresses follow from its stations
         from .beam.stress import beam_stresses  # loads SciPy

@@ -38,7 +38,7 @@ class FamilyModel:
     K: sp.csr_matrix
     M: sp.csr_matrix
     strain: sp.csr_matrix  # (s, m) the strains at Gauss points, scaled such that K = strainᵀ strain
-    # for each of the rows U_X … R_Z that the family moves, (k, m): the field at k stations from x
+    # for each component U_X … R_Z that the family moves, (k, m): translation or rotation at k stations from x
     fields: Mapping[int, sp.csr_matrix]
 
     def motion(self, places: Sequence[int]) -> Array:

@@ -30,8 +30,8 @@ def shape_integrals(link: BeamLink, stations: Functions, fields: Array) -> Invar
     With displacement (u, v, w) and rotation (φ, θ_y, θ_z) of the section, a point (x, y, z) moves by Φ0 + y Φy + z Φz,
     Φ0 = (u, v, w), Φy = (−θ_z, 0, φ), Φz = (θ_y, −φ, 0); principal axes leave ∫y = ∫z = ∫yz = 0.
 
-    Euler–Bernoulli links are a line of mass on the axis, ∫y² = ∫z² = 0, with the spin inertia J_s, h_s, S_s about it
-    (eq. 4). S̄_33 includes S_s: no planar invariant then has rotary inertia, and m_ff = S̄_11 + S̄_22 + S̄_33 holds.
+    Euler–Bernoulli links are a line of mass on the axis, ∫y² = ∫z² = 0, with the inertia `J_spin` … about it.
+    `S_bar_kl[2, 2]` includes `S_spin`: the sum of all [k, k] is then the modal mass.
     """
     line_mass = link.model.theory == "euler-bernoulli"
     zero = np.zeros_like(fields[U_X])
@@ -129,7 +129,8 @@ def _products(values: Array, slopes: Array) -> Array:
 def section_forces(link: BeamLink, x: Array, interfaces: Mapping[str, float], rotary: Rotary) -> Array:
     """Force, N, and moment, N·m (6, l, g), at x (g,), m, by unit load on the straight link in its reference condition.
 
-    Loads at the tip act on the section there, too. `rotary`: the inertia of sections that turn, see `ROTARY`.
+    `interfaces`: m from the root; loads at the tip act on the section there, too. `rotary`: `ROTARY`, {} without rotary
+    inertia.
     """
     of_inertia, length, units = _of_inertia(link, np.append(x, 0.0), rotary), link.geometry.length, np.eye(6)[..., None]
     forces, at_root = [of_inertia[..., :-1]], [of_inertia[..., -1:]]
@@ -153,7 +154,7 @@ def _lever(force: Array) -> Array:
 
 
 def of_tip_support(link: BeamLink, x: Array, at_root: Array) -> Array:
-    """Force, N, and moment, N·m (6, …, g), at x (g,), m, of a tip support against moments `at_root` (6, …, 1 or g)."""
+    """Force, N, and moment, N·m (6, …, g), at x (g,), m: a tip support cancels the moments `at_root` (6, …, 1 or g)."""
     L, none = link.geometry.length, np.zeros_like(at_root[0])
     return of_load(np.stack([none, -at_root[5] / L, at_root[4] / L, none, none, none]), L - x)
 

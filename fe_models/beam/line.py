@@ -51,7 +51,7 @@ class Functions:
         return sp.csr_matrix((shapes.ravel(), (row, self.element[cell].ravel())), shape=(X.size, self.x.size))
 
     def root(self, weight: Array, derivative: int = 0) -> sp.csr_matrix:
-        """B (4e, size) with BᵀB = ∫ weight f⁽ᵈ⁾ g⁽ᵈ⁾ dx, x in m, for weights (e,) of elements and d = `derivative`."""
+        """B (4e, size) with BᵀB = ∫ weight f⁽ᵈ⁾ g⁽ᵈ⁾ dx of shape functions, x in m, weights (e,), d = `derivative`."""
         points, weights = leggauss(GAUSS)  # type: ignore[no-untyped-call, unused-ignore]
         elements = len(self.element)
         values = self._within(np.repeat(np.arange(elements), GAUSS), np.tile(0.5 * (points + 1), elements), derivative)
@@ -63,7 +63,7 @@ def gram(B: sp.csr_matrix) -> sp.csr_matrix:
     """BᵀB (m, m) of B (4e, m), made of `Functions.root`.
 
     The sum goes Gauss point by Gauss point: contributions of neighboring elements are then rounded alike and cancel in
-    rigid motions, where one sum over all leaves a soft elastic foundation.
+    rigid motions.
     """
     return sum(B[g::GAUSS].T @ B[g::GAUSS] for g in range(GAUSS)).tocsr()
 

@@ -102,11 +102,10 @@ def lowest_modes(
 ) -> tuple[Array, Array]:
     """The `count` lowest eigenpairs of K x = ω² M x: ω² (count,) ascending in rad²/s², X (m, count) with Xᵀ M X = I.
 
-    Assembly rounds K's large entries, of order EI/h³; against the lowest ω² these errors grow as elements⁴. The
-    Rayleigh quotient of the strains, which are differences of x once and not twice over (elements²), gives ω² without
-    them, and tells where a mesh is too fine for double precision. `flexibility`: K⁻¹, or that with fixed interfaces.
-    Raises `SolveError` where round-off errors spoil the modes.
+    `flexibility`: K⁻¹, or that with fixed interfaces. Raises `SolveError` where round-off errors spoil the modes.
     """
+    # Round-off of K, of order EI/h³, grows as elements⁴ against the lowest ω²; that of strains, by which Rayleigh
+    # quotients yield ω², as elements².
     K, M, strain = model.K, model.M, model.strain
     try:
         F = flexibility or BeamFlexibility(model)

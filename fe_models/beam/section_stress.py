@@ -40,8 +40,7 @@ def section_stress(record: SectionRecord, section: Section, F: Array, M: Array, 
 def surface_shear(extent: float, across: float, width: float) -> float:
     """Shear strain along x by twist (1 rad/m), in m: its mean over the middle `width` (m) of a face of a rectangle.
 
-    The face is `across` (m) wide, the opposite one `extent` (m) away: γ = −∂Ψ/∂n, with Ψ Prandtl's stress function
-    over G φ'.
+    The face is `across` (m) wide, the opposite one `extent` (m) away.
     """
     nodes, weights = np.polynomial.legendre.leggauss(MEAN_POINTS)  # type: ignore[no-untyped-call, unused-ignore]
     record = RectangleSection(shape="rectangle", height=extent, width=across)

@@ -17,7 +17,7 @@ def shear_modulus(link: BeamLink) -> float:
 
 
 def rod_properties(link: BeamLink, family: Family, nodes: Array) -> tuple[Array, Array]:
-    """Stiffness (e,) EA, N, or GJ, N·m², and inertia (e,) ρA, kg/m, or ρI_p, kg·m, of axial or torsional motion."""
+    """EA, N, and ρA, kg/m, of axial, GJ, N·m², and ρI_p, kg·m, of torsional motion, (e,) between `nodes`, m."""
     stiffness, inertia = ("area", "area") if family == "axial" else ("torsion", "I_p")
     modulus = link.material.youngs_modulus if family == "axial" else shear_modulus(link)
     return modulus * cellwise(link, nodes, stiffness), link.material.density * cellwise(link, nodes, inertia)

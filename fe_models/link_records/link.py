@@ -209,7 +209,7 @@ class BeamLink(_Link):
 
     @property
     def sections(self) -> list[Section]:
-        """Section properties of each segment. Without Poisson's ratio, J and k belong to ν = 0: nothing uses them."""
+        """Section properties of each segment. Without Poisson's ratio, `torsion` and `shear`, unused, are for ν = 0."""
         nu = self.material.poissons_ratio or 0.0
         return [
             rectangle(record.height, record.width, nu)

@@ -94,7 +94,7 @@ def _number(where: str, name: str, text: str) -> float | None:
 
 
 def paired(rows: list[MeasuredMode], family: tuple[str, ...]) -> Iterator[tuple[int, MeasuredMode]]:
-    """Yield the measured modes of `family`, each with its number (from 0) among the computed modes of that family."""
+    """Yield measured modes, each after its number, from 0, among computed modes, whose families are `family` (n,)."""
     for row in rows:
         candidates = [k for k, name in enumerate(family) if not row.family or name == row.family]
         if row.number <= len(candidates):

@@ -51,7 +51,7 @@ class Inertia:
     total: Callable[[Array], Array]
 
     def without(self, X: Array, U: Array) -> Array:
-        """Return U (m, k) M-orthogonal to X (m, n), XᵀMX = I: its part in X is taken out twice, to round-off."""
+        """Return U (m, k) M-orthogonal to X (m, n), XᵀMX = I, to round-off."""
         for _ in range(2):
             U = U - X @ self.total(X.T @ self.mass(U))
         return U
@@ -144,9 +144,9 @@ def interface_loads(
     """The inertia and the loads at interfaces that deform a link into each of its n modes Y, K Y = M Y W + B c.
 
     Returns W (n, n), rad²/s², and by interface c (6, n), force in N and moment in N·m per unit of modal coordinate. B
-    are unit loads. An eigenmode x has K x = ω² M x. A residual mode r = R c, after so many `eigenmodes` X, has
-    K r = Bc − M X XᵀBc; c follows from the work rᵀBc = rᵀKr.
+    are unit loads. `omega2` (n,) is ω², first of so many `eigenmodes`, then of residual attachment modes.
     """
+    # K x = ω² M x of an eigenmode; K r = Bc − M X XᵀBc of a residual one, c by the work rᵀBc = rᵀKr.
     W, of = np.diag(omega2), slice(eigenmodes, None)
     W[of, of] = 0.0
     if eigenmodes == omega2.size:

@@ -133,9 +133,9 @@ def interface_loads(
 ) -> tuple[Array, dict[str, Array]]:
     """W (n, n), rad²/s², and by interface c (6, n), N and N·m: K X = M X W + B c for the n modes X of a link.
 
-    As `attachment_modes.interface_loads`. A fixed-interface mode with reactions c has K φ = ω² M φ + B c, a constraint
-    mode K ψ = B c. So W = N Nᵀ Ω², N (n, …) being the fixed-interface modes in X; the product with Xᵀ yields c.
+    B are unit loads at interfaces. `omega2` (n,) is ω², rad²/s², `static` the number of static shapes.
     """
+    # K φ = ω² M φ + B c of fixed-interface modes φ = X N, K ψ = B c of constraint modes: W = N Nᵀ Ω², Xᵀ K X yields c.
     coordinates = interface_coordinates(omega2, families, static, interfaces)
     W = coordinates.fixed @ (coordinates.fixed.T * omega2)
     c = coordinates.constraint.T @ (np.diag(omega2) - W)

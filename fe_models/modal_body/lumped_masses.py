@@ -85,8 +85,8 @@ def with_added(integrals: Of, added: Mapping[str, Any]) -> Of:
 def attached_integrals(m: float, x: Array, E: Array, Phi: Array, phi: Array) -> dict[str, Any]:
     """Return what a rigid mass adds to the fields of `Invariants`, by name.
 
-    It is m (kg) with its center at x (3,), m, and E (3, 3) = ∫ρ ξ ξᵀ dV, kg·m², about it. The center moves by Φ p, its
-    points by (φ p) × ξ more; Φ and φ are (3, n), m and rad per unit of modal coordinate.
+    It is m (kg) with its center at x (3,), m, and E (3, 3) = ∫ρ ξ ξᵀ dV, kg·m², ξ from there. The center moves by
+    Φ p, a point by (φ p) × ξ more; Φ and φ are (3, n), m and rad per unit of modal coordinate p.
     """
     turn = np.einsum("kab,an->kbn", LEVI_CIVITA, phi)  # (φ × ξ)_k = turn[k, b] ξ_b, each (n,)
     return {
@@ -126,10 +126,10 @@ def with_lumped_stiffness(matrices: Array, names: Sequence[str], attached: Seque
 def of_turning(E: Array, products: Array) -> Array:
     """Geometric stiffness (9, n, n) of the loads r_x … omega_yz: d'Alembert's on a rigid body that turns.
 
-    To second order, a point d from its center moves by ½ φ × (φ × d) = −½ (d φ² − φ φ·d) besides φ × d. Of d φ² − φ
-    φ·d = pᵀG p are K_x,kl = ∫ρ d_k G_l dV, and from them K_ω = 1 tr K_x − sym K_x and K_r,a = ε_abc K_x,bc
-    (docs/theory.md). E (3, 3) is ∫ρ d dᵀ dV in kg·m², `products` (3, 3, n, n) φ_a φ_b.
+    E (3, 3) is ∫ρ d dᵀ dV, kg·m², of d from its center; `products` (3, 3, n, n) are φ_a φ_b of its rotation φ, rad.
     """
+    # To second order d moves by ½ φ × (φ × d) besides φ × d; of −φ × (φ × d) = pᵀG p are K_x,kl = ∫ρ d_k G_l dV, and
+    # from them K_ω = 1 tr K_x − sym K_x and K_r,a = ε_abc K_x,bc (docs/theory.md).
     products = 0.5 * (products + products.transpose(0, 1, 3, 2))
     K_x = np.einsum("kl,aamn->klmn", E, products) - np.einsum("kb,blmn->klmn", E, products)
     K_omega = np.einsum("ij,kkmn->ijmn", np.eye(3), K_x) - 0.5 * (K_x + K_x.transpose(1, 0, 2, 3))

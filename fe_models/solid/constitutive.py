@@ -11,8 +11,7 @@ from ..link_records.link import Material, OrthotropicMaterial
 def stiffness(material: Material | OrthotropicMaterial) -> Array:
     """Return C (6, 6), σ = C ε, Pa; rows σ_xx, σ_yy, σ_zz, σ_yz, σ_xz, σ_xy, columns ε_xx … and 2ε_yz, 2ε_xz, 2ε_xy.
 
-    Inverse of the compliance of Jones, Mechanics of Composite Materials (1999), eq. 2.26; isotropy is the case of equal
-    constants, of a material with `poissons_ratio`.
+    Inverse of the compliance of Jones, Mechanics of Composite Materials (1999), eq. 2.26; equal constants if isotropic.
     """
     E, nu = np.full(3, material.youngs_modulus), np.full(3, material.poissons_ratio)
     of_shear = material.shear_modulus if isinstance(material, OrthotropicMaterial) else E / (2 * (1 + nu))

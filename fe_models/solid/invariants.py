@@ -73,8 +73,8 @@ def prestressed(
 ) -> Array:
     """Geometric stiffness (l, n, n), rad²/s² per unit of load, of `modes` (3 owned, n) by unit load; collective.
 
-    It belongs to centers and rotation vectors of the interfaces. `loads` and `shapes` (3 owned, l) are nodal forces,
-    N, and displacements, m, of the unit loads, `rows` B (6, 3 owned) the mean motion of each interface, whose transpose
+    Forces act at centers of interfaces, moments on their rotation vectors. `loads` and `shapes` (3 owned, l) are nodal
+    forces, N, and displacements, m, of unit loads, `rows` B (6, 3 owned) the mean motion of each interface; Bᵀ
     spreads loads on it. `supports`: fixed components by interface, in the order of `flexibility.B`; empty without B.
     """
     total = geometric_stiffness(flexibility.model, modes, shapes)

@@ -47,9 +47,8 @@ def wanted_modes(
 ) -> ModeSet:
     """Compute the modes that `link.modes` selects; collective. `read`: `section_motion` of modes (3 owned, n), m.
 
-    The search for the lowest modes goes on until the wanted ones are among them. Raises `InputError`, which names
-    `where`, for more than the mesh has, or than can be found in reasonable time; `SolveError` where modes are lost in
-    round-off.
+    Raises `InputError`, which names `where`, for more than the mesh has, or than can be found in reasonable time;
+    `SolveError` where modes are lost in round-off.
     """
     family, model = "all" if link.modes.family == "all" else link.families, mass.model
     numbers = np.array(link.modes.indices or range(1, (link.modes.count or 0) + 1)) - 1
@@ -186,7 +185,7 @@ def attachment_modes(
     """Return attachment modes of the loads at so many `interfaces` that belong to `families`; collective.
 
     `loads` (3 owned, l), N, and `shapes`, m, are those of `invariants.unit_loads` and `static_shapes`, `modes` the
-    eigenmodes; `length`, m, and `twists_along` are as in `beam.modes.attachment_modes`.
+    eigenmodes. Moments are unit forces times `length` (m); `twists_along` adds a torque distributed along the link.
     """
     model, scale = mass.model, np.repeat([1.0, length], 3)
     static = {}
@@ -202,6 +201,9 @@ def attachment_modes(
 
 
 def ritz_modes(model: SolidModel, both: ModeSet, count: int) -> ModeSet:
-    """Ritz modes, as `in_order`, in the space `both`: `count` fixed-interface modes, then static shapes; collective."""
+    """Ritz modes in the space `both`: `count` fixed-interface modes, then static shapes; collective.
+
+    Those that count as eigenmodes come first: see `in_order`.
+    """
     ritz = in_order(strain_energy(model, both.X), both.families, [k >= count for k in range(len(both.families))])
     return ModeSet(ritz.omega2, ritz.families, both.X @ ritz.X)

@@ -117,7 +117,7 @@ def recovered_stresses(
 ) -> dict[str, Any]:
     """Compute the stresses that a link file requests: `stress` … `surface_static` of its `ModalBody`.
 
-    `modes` (3 (owned + ghosts), n); `shapes` (3 owned, l), m, under unit loads; `surface` (p, 3), m, points there.
+    `modes` (3 (owned + ghosts), n); `shapes` (3 owned, l), m, under unit loads; `surface` (p, 3), m, its points.
     """
     if not (link.stress.points or link.stress.surface):
         return {}
