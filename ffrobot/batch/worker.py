@@ -45,7 +45,7 @@ class Worker:
         self._requests, self._answers = self._process.stdin, self._process.stdout
 
     def perform(self, arguments: list[str]) -> Done:
-        """Run `ffrobot ARGUMENTS` in the worker. If the worker ends with the run, the exit code is its own."""
+        """Run `ffrobot ARGUMENTS` in the worker. If the worker ends with the run, the exit code is the worker's."""
         self._messages.seek(0)
         self._messages.truncate()
         answer = b""

@@ -94,7 +94,10 @@ class Campaign:
         self.machine = _about_machine()
 
     def scene(self, path: Path, analysis_name: str | None, folder: Path, parts: Sequence[str]) -> Swept | None:
-        """Measure the `parts` "work-precision" and "axes" of a scene; returns reference and points of the first."""
+        """Measure the `parts` "work-precision" and "axes" of a scene; returns reference and points of the first.
+
+        `analysis_name` None: the first that integrates over time.
+        """
         scene = load_scene(path)
         analysis = find_analysis(scene, analysis_name)
         swept = self.work_precision(scene, analysis.name, folder) if "work-precision" in parts else None
@@ -110,7 +113,7 @@ class Campaign:
         return swept
 
     def work_precision(self, scene: Scene, name: str, folder: Path) -> Swept:
-        """Measure run time against error of one analysis, and write records and figures; returns as `scene`."""
+        """Measure run time against error of one analysis, and write records and figures; returns reference, points."""
         settings = self.settings
         tolerance = TIGHTER * min(settings.tolerances)
         reference = find_reference(scene, name, tolerance, settings.budget, self.display)
@@ -157,7 +160,7 @@ class Campaign:
 
 
 def inputs_of(scene: Scene, bodies: Mapping[str, str]) -> dict[str, object]:
-    """Hash of a scene, and those of its modal bodies, for records."""
+    """Hash of a scene, and `bodies`, those of its modal bodies by name, for records."""
     return {"name": scene.name, "scene": _content_hash(scene.text), "bodies": dict(bodies)}
 
 

@@ -54,7 +54,7 @@ def _histories(results: Results, analysis: str) -> Histories:
 
 
 def errors(measured: Histories, reference: Histories) -> dict[str, float]:
-    """Return, by kind, the largest difference at any output, relative to the peak of the same dataset in `reference`.
+    """By kind of quantity, the largest difference at any output, relative to the peak of its dataset in `reference`.
 
     Kinds and datasets that only one of them has are omitted.
     """
@@ -225,7 +225,7 @@ class ReferenceRun:
 
 @dataclass
 class Point:
-    """A point of the diagram: integrator at a tolerance, `seconds` of each run, `error` by kind, relative to peaks."""
+    """A point of the diagram: integrator, tolerance, `first` run, `seconds` of each run, `error` by kind over peaks."""
 
     integrator: str
     tolerance: float

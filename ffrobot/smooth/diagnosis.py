@@ -81,7 +81,7 @@ class Diagnosis:
 
 
 def diagnose(robot: Robot, recording: Recording, limits: Limits) -> Diagnosis:
-    """Simulate the robot under the stream as it is, and find its faults. Raises `SolveError` as `Robot.ride`."""
+    """Simulate the robot under the stream as it is, and find its faults. Raises `SolveError` if it cannot follow."""
     times, command = recording.dense(min(recording.step / 4, 1e-3))
     ride = robot.ride(times, command)
     path, modes, even = robot.servo.motors(times, command), modes_along(robot, ride), evened(recording)
@@ -119,7 +119,7 @@ def diagnose(robot: Robot, recording: Recording, limits: Limits) -> Diagnosis:
 
 
 def modes_along(robot: Robot, ride: Ride, *, of_links: bool = False) -> list[Modes]:
-    """Return modes at the postures of `ride`, the last one at rest; `of_links` as in `Robot.modes`."""
+    """Return modes at the postures of `ride`, the last one at rest; `of_links`: motors and joints move alike."""
     return [robot.modes(q, of_links=of_links) for q in ride.postures]
 
 

@@ -38,7 +38,7 @@ def print_smooth(smoothed: Smoothed, console: Console) -> None:
 
 
 def write_page(smoothed: Smoothed, motion: Path | None, path: Path) -> None:
-    """Write an HTML file: the verdict, faults, tables, the picture."""
+    """Write an HTML file: the verdict, faults, tables, the picture; `motion`: the recording, None if planned."""
     used = [smoothed.robot.file, *([motion] if motion else [])]
     part = {
         "title": f"{smoothed.robot.file.name}: {motion.name if motion else 'trajectories of the scene'}",

@@ -57,7 +57,7 @@ class Recording:
     def dense(self, step: float) -> tuple[Array, Array]:
         """Return times (N,), s, at most `step` s apart, and set points (N, n), rad or m, by cubics with recorded rates.
 
-        Without rates it returns the recorded ones.
+        Without rates both are as recorded.
         """
         if self.rates is None:
             return self.times, self.values
@@ -185,7 +185,7 @@ def faults_of_stamps(recording: Recording) -> Iterator[Fault]:
 def evened(recording: Recording) -> Recording:
     """Return the recording with rows at even times, if these make a smoother motion than those of their stamps.
 
-    Even times divide the whole duration: the median step is some per cent off with jitter, which would add up.
+    Even times divide the whole duration: the median step is off with jitter.
     """
     if recording.rates is not None:
         return recording

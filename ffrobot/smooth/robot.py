@@ -49,7 +49,7 @@ class Modes:
 
     Attributes:
         omega, ratio: (m,) rad/s, and damping ratios.
-        driven: (m, n) acceleration of each mode, its size at the point, by that of each motor; m/s² by rad/s² or m/s².
+        driven: (m, n) acceleration of each mode at the point, per acceleration of each motor; m/s² per rad/s² or m/s².
     """
 
     omega: Array
@@ -156,10 +156,9 @@ class Robot:
         return Ride(replace(whole, residual=soon.residual), run.time, off, postures, torque, sag)
 
     def inverted(self, times: Array, motion: Piecewise) -> tuple[Array, Array]:
-        """Set points (N, n), rad or m, every `times[1]` s for links to follow `motion`, and motors' torques (N·m, N).
+        """Set points (k, n), rad or m, every `times[1]` s for links to follow `motion`, and motors' torques (N·m, N).
 
-        Gears are strained by what the motion needs: motors are ahead by K⁻¹τ, and the controllers are inverted, which
-        begin before the motion and end after it by `Servo.margins`.
+        Motors are ahead by the strain of gears. Set points begin before the motion and end after it by `Servo.margins`.
         """
         run = self._solved(motion, float(times[-1]), float(times[1]), by_joints=True)
         position, rate = motion.sample(times), motion.sample(times, 1)

@@ -165,8 +165,7 @@ class Servo:
     def motors(self, times: Array, command: Array) -> Piecewise:
         """Paths of n motors from rest by set points (T, n), rad or m, at `times` (T,), s, then for `settled` s or more.
 
-        Each line of the command is exact: a change of its slope by Δ adds Δ (t − Σρ + Σρ e^(λt)), with the residues ρ
-        of G/s² at the poles λ of G.
+        The responses to straight lines between set points are exact.
         """
         delays = np.array([axis.delay for axis in self.axes])
         if delays.any():
@@ -194,22 +193,25 @@ class Servo:
 
     @property
     def margins(self) -> tuple[float, float]:
-        """Times (s) by which set points of `command` begin before motors, and end after them: zeros of G decay."""
+        """Times (s) by which set points of `command` begin before motors, and end after them.
+
+        Responses at the zeros of controllers G(s) decay meanwhile.
+        """
         zeros = np.concatenate([np.roots(axis.numerator) for axis in self.axes]).astype(complex)
         before, after = _decay(zeros[zeros.real > 0.0]), _decay(zeros[zeros.real <= 0.0])
         return before, after + float(np.ptp([axis.delay for axis in self.axes]))
 
     @property
     def is_invertible(self) -> bool:
-        """Whether `margins` are short; near the imaginary axis zeros of G decay slowly or never."""
+        """Whether `margins` are short; near the imaginary axis responses at zeros of G(s) decay slowly or never."""
         return max(self.margins) <= LASTING
 
     def command(self, step: float, position: Array, rate: Array) -> Array:
         """Set points (T, n) every `step` s for `position` and `rate` (T, n), rad or m, s, of motors from rest to rest.
 
-        By Fourier transforms: θ_cmd = θ_r + F θ̇_r, F = (e^(−Δs)/(G sinc²) − 1)/s. The longest delay Δ keeps axes
-        together; sinc² is the response of straight lines between set points.
+        By Fourier transforms with inverse controllers. The longest delay of a controller keeps axes together.
         """
+        # θ_cmd = θ_r + F θ̇_r, F = (e^(−Δs)/(G sinc²) − 1)/s, sinc² for straight lines between set points.
         frequency, count = np.fft.rfftfreq(len(rate), step), len(rate)
         s, longest = 2j * np.pi * frequency[1:], max(axis.delay for axis in self.axes)
         F = np.empty((len(frequency), len(self.axes)), dtype=complex)

@@ -152,12 +152,12 @@ def value_at(scene_path: Path, key: tuple[str, ...], option: str) -> Value:
 
 
 def number_at(path: Path, key: tuple[str, ...], option: str, kind: str = "scene file") -> float:
-    """Return the number at `key`; see `value_at`. Raises `InputError` without one."""
+    """Return the number at `key`; see `value_at`. Raises `InputError` without one; messages call the file `kind`."""
     return number_of(*_place(path, _read(path, kind), key, {}, option), f"{path}: {option}", key)
 
 
 def number_of(tables: Table, key: tuple[str, ...], label: str, whole: tuple[str, ...] = ()) -> float:
-    """Return the number at `key` of `tables`; see `set_key`. Raises `InputError`, with `label` first, without one."""
+    """Return the number at `key` of `tables`. Raises `InputError` without one: `label` first, `whole` for the key."""
     value = value_of(tables, key, whole, label)
     if isinstance(value, bool) or not isinstance(value, int | float):
         text = "none" if value is None else repr(value)
@@ -234,7 +234,7 @@ def _resolve(data: Node, folder: Path) -> None:
 
 
 def value_of(data: Node, key: tuple[str, ...], whole: tuple[str, ...] = (), option: str = "--vary") -> Value:
-    """Return data[key], see `set_key`; None if absent. `option`: of the command, in messages; `whole`: as there."""
+    """Return data[key], see `set_key`; None if absent. Messages name `option` and, for the key, `whole`."""
     value: Value = data
     for part in key:
         if not isinstance(value, dict | list) or (isinstance(value, dict) and part not in value):

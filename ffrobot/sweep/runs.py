@@ -86,7 +86,7 @@ class Row:
         return not self.wanted or (bool(wanted) and set(wanted) <= set(self.wanted))
 
     def changes(self, inputs: Mapping[str, str]) -> list[str]:
-        """Return names of files, or `PROGRAM`, changed since the run, by `inputs` of now; see `run.inputs.changed`."""
+        """Return names of files, or `PROGRAM`, changed since the run; `inputs`: fingerprints now; see `run.inputs`."""
         return changed(self.inputs, {**inputs, **{name: digest_of_file(Path(name)) for name in self.imported}})
 
 
@@ -215,7 +215,7 @@ def is_vector(results: Results, name: str, values: Array) -> bool:
 
 
 def collected(request: str) -> tuple[str, str]:
-    """Split a `--collect` request into dataset and reduction, or the word of `SETTLING` and the point.
+    """Split a `--collect` request into dataset and reduction, or "residual" or "settling" and a point.
 
     Raises `InputError` where the word behind the colon is unknown.
     """
