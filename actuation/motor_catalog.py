@@ -118,7 +118,7 @@ def choices(task: JointTask, catalog: Sequence[CatalogMotor]) -> list[MotorChoic
 
 
 def choice_of(task: JointTask, motor: CatalogMotor, N: float) -> MotorChoice:
-    """Judge a motor with gear ratio N: τ = J N α + L/(N η) while the load L takes power, J N α + η L/N else.
+    """Judge a motor with gear ratio N by its torque J N α + L/(N η) while the load L takes power, J N α + η L/N else.
 
     J is the inertia of the rotor, α the acceleration of the joint, η the efficiency of the gear.
     """

@@ -89,7 +89,7 @@ class PointSet:
         return self.direction, position, np.vstack([point.translation for point in self.points]), self.scale
 
     def L_a(self, p: Array) -> Array:
-        """Return generalized forces (T, 6 + n, c), N, N·m, N/√kg, of 1 N of each at p (T, n), m·√kg; body axes."""
+        """Return generalized forces (T, 6 + n, c), N, N·m, N/√kg, of 1 N per force at p (T, n), m·√kg; body axes."""
         e, columns = self.direction, []
         for k, point in enumerate(self.points):
             u = point.position + p @ point.translation.T

@@ -33,7 +33,7 @@ RIGID = 1e-6  # of the fastest eigenvalue: slower ones are round-off of motion w
 
 @struct
 class Feedback:
-    """Discrete law of all controllers: ξ(k+1) = A ξ + B y, u = C ξ + D y, for deviations y from the reference.
+    """Discrete law of controllers, states ξ: ξ(k+1) = A ξ + B y, u = C ξ + D y, for deviations y from the reference.
 
     A (states, states), B (states, outputs), C (inputs, states), D (inputs, outputs) are in SI units.
     """

@@ -43,7 +43,7 @@ NAMED = 0.1  # of the largest entry of a vector of states
 class Observer:
     """Matrices of an observer with n states for p readings y: x̂ = x̂⁻ + L (y − C x̂⁻), estimates E x̂; SI units.
 
-    The next x̂⁻ is A x̂ + B u + M (y − C x̂⁻) with commands u; y and u are deviations from the reference.
+    The next prediction x̂⁻ is A x̂ + B u + M (y − C x̂⁻) with commands u; y and u are deviations from the reference.
     """
 
     A: Array  # (n, n)

@@ -61,7 +61,7 @@ class LinkPatches:
     reach: Reach  # of all patches side by side on the modes that they reach together
     bodies: Mapping[str, OnBody]  # by name, the link and, where it is divided, its pieces
     slowness: float  # √(ρA/EI) of the link, s/m²
-    # (n, n) from modal forces to the part that the equations keep, where patches serve that alone; without unit
+    # (n, n), without unit, from modal forces to the part that the equations keep; None: all of them
     on_kept: Array | None = None
 
     @property

@@ -105,7 +105,7 @@ def served_first(served: int, n: int, patches: int) -> Array:
 
 
 def weights(key: str, layout: PztLayout, served: int, stiffness: Array, points: Mapping[str, Array]) -> Array:
-    """Return W_sqrt (rows, n): of modes, or of the deflections Φ(x) K⁻¹ r that unmet modal forces r cause at points.
+    """Return root weights W_sqrt (rows, n) of modes, or of deflections Φ(x) K⁻¹ r by unmet modal forces r at points.
 
     The first `served` of n modes have `stiffness` (n,), rad²/s², and at points by name Φ (components, n), 1/√kg. Raises
     `InputError`, which begins with `key`, for weights that do not fit.

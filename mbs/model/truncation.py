@@ -27,10 +27,10 @@ DEPENDENT = 1e-8  # of the first static shape, in energy: smaller ones are depen
 def with_fewer_modes(body: Body, lowest: int, loaded: Sequence[str]) -> Body:
     """Return the body with its `lowest` modes and the static response of others to each load at points `loaded`.
 
-    A unit load (modal forces Bᵀ) bends the discarded modes d by Ω_d⁻² B_dᵀ. These shapes, orthonormal in mass and
-    uncoupled, are further modes: the flexibility B K⁻¹ Bᵀ stays exact. A body that would save none is unchanged.
-    Attachment modes of the file are not kept, but contribute to the static shapes. Modes that no load couples have
-    separate shapes, which stay in a plane of bending, or in torsion.
+    A unit load bends the discarded modes. These shapes, orthonormal in mass and uncoupled, are further modes: the
+    static flexibility at `loaded` stays exact. A body that would save none is unchanged. Attachment modes of
+    the file are not kept, but contribute to the static shapes. Modes that no load couples have separate shapes, which
+    stay in a plane of bending, or in torsion.
     """
     lowest = min(lowest, body.n_eigenmodes)
     kept = np.sort(np.argsort(body.stiffness[: body.n_eigenmodes], kind="stable")[:lowest])
