@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def study_options(folder: str, figures: str) -> Callable[[F], F]:
-    """Decorator: add the scene argument and options of all studies; `folder`: default output; `figures`: help text."""
+    """Decorator: add the options of studies and SCENE; `folder`: default of `-o`; `figures`: help of `--figures`."""
     return together(
         logging_options,
         python_option,

@@ -55,7 +55,7 @@ def batch_options(text: str) -> Callable[[F], F]:
 
 
 def runs_options(folder: str, of: str = "Folder") -> Callable[[F], F]:
-    """Decorator: add `-j`, `--scheduler`, `--retry` and `-o`, with help text `of`, default `folder` by the input."""
+    """Decorator: add `-j`, `--scheduler`, `--retry`, `-o`; help of `-o`: `of`, default `folder` next to the input."""
     return together(
         output_option("DIR", f"{of} [{folder} next to the input]."),
         click.option("--retry", is_flag=True, help="Repetition of failed runs."),
@@ -105,7 +105,7 @@ def protect_scene(file: Path, *others: Path | None) -> None:
 
 
 def reading(*files: Path) -> AbstractContextManager[None]:
-    """Context that refuses to overwrite `files`, and turns errors in reading them into `InputError` on damage."""
+    """Context that refuses to overwrite `files`; errors in reading damaged ones become `InputError`."""
     from ..common import hdf5
 
     return hdf5.reading(*files)

@@ -43,9 +43,6 @@ def derivative(offsets: Array, values: Array) -> Derivative:
 
     Steps are taken two and three sizes at a time; those with the least estimated error make the derivative
     (Ridders, Advances in Engineering Software 4, 1982). One side is enough, at a lower order.
-
-    The estimate adds truncation, the difference from the derivative without the largest steps, and noise, by the
-    divided difference of the highest order.
     """
     known = np.isfinite(values)
     offsets, values = offsets[known], values[known]
@@ -79,8 +76,8 @@ ROUGH = 1e-2  # of a derivative: beyond, the response is hardly smooth
 class Base:
     """Point of differentiation: k `keys` with their values `point`, and g `responses` with their `readings`.
 
-    `steps` (k): largest change of each key. Runs with other keys reuse the time steps of the scene's own run by the
-    changes `again` to their scenes; `repeats` is then their tolerance. Otherwise, `repeats` is 0.
+    `steps` (k): largest change of each key. `again`: changes of a scene with which a run reuses the time steps of the
+    scene's own run; `repeats` is then the tolerance of these runs, else 0.
     """
 
     responses: tuple[Response, ...]
@@ -114,8 +111,8 @@ Method = Literal["differences", "repeated steps", "one-sided", "none"]
 class Entry:
     """∂response/∂key with its estimated error, both in SI units, NaN where there is none.
 
-    `step`: largest change of the key; `notes`: restrictions; `unresolved`: the part of the error due to the distance
-    of outputs, which no other step reduces.
+    `step`: largest change of the key; `notes`: restrictions; `unresolved`: the part of the error due to the time
+    between outputs, which no other step reduces.
     """
 
     derivative: float

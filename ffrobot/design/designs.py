@@ -38,10 +38,10 @@ ALGEBRAIC = ("static", "pcid")
 def changes_for(
     path: Path, responses: Sequence[Response], tolerance: float | None, *, keep_steps: bool = False
 ) -> dict[Key, Any]:
-    """Return changes of the scene at `path`: only analyses that `responses` need, with `tolerance` or less.
+    """Return changes of the scene at `path`: only analyses that `responses` need, with `tolerance` (None: own) or less.
 
     Responses need the analysis that they name, by default the first, and its sources. Checks of inverse analyses are
-    omitted. There are at least `OUTPUTS` outputs. `keep_steps`: whether results contain the time steps.
+    omitted; outputs are at least `OUTPUTS`. `keep_steps`: whether results contain the time steps.
     """
     scene = load_scene(path)
     names = [one.name for one in scene.analysis]
@@ -73,7 +73,7 @@ def may_repeat(keys: Sequence[Key]) -> bool:
 def repeated_steps(results: Results) -> dict[Key, Any] | None:
     """Return changes of a scene with which its integrations reuse the time steps of the run with these `results`.
 
-    None if an analysis cannot; no changes if none is integrated, as its results depend smoothly on keys anyway.
+    None if an analysis cannot; no changes if none is integrated.
     """
     about = {name: results.attributes(name) for name in results.analyses}
     stepping = [name for name in about if about[name]["steps"]]
@@ -89,7 +89,7 @@ Point = tuple[float, ...]
 
 
 def moved(point: Point, k: int, value: float) -> Point:
-    """Return `point` with entry k replaced."""
+    """Return `point` with entry k replaced by `value`."""
     return (*point[:k], value, *point[k + 1 :])
 
 
@@ -102,7 +102,7 @@ def in_words(keys: Iterable[Key], point: Point) -> str:
 class Runs:
     """Settings of the runs of designs: scene file, folder (`kept` or temporary), the batch that performs them.
 
-    `retry`: whether to repeat designs that failed before.
+    `retry`: whether to repeat designs that failed before. `watcher` observes progress and can stop the runs.
     """
 
     path: Path
@@ -126,7 +126,8 @@ def runs_of(
 ) -> Iterator[Runs]:
     """Context with `Runs` of a scene file in the folder `output`, or a temporary one; inputs cannot be overwritten.
 
-    `executor` performs the runs, else `processes` on this machine. Raises `InputError` without it under mpirun.
+    `executor` performs the runs, else `processes` on this machine. `allow_python`: files and folders whose Python
+    files scenes may run. Raises `InputError` under mpirun without `executor`.
     """
     if executor is None and of_mpi() > 1:
         raise InputError("executor: expected one under mpirun, as of mpi4py.futures.MPICommExecutor", "none")
@@ -176,7 +177,7 @@ class Design:
             return tuple(response.read(results) for response in responses)
 
     def follow(self, responses: Sequence[Response], readings: Sequence[Reading]) -> tuple[Reading, ...]:
-        """Return responses at the time, column or mode of another design's `readings`; empty if this one failed."""
+        """Return responses at the time, column or mode of another design's `readings`; empty if the run failed."""
         if not self.completed:
             return ()
         with self.results() as results:
@@ -281,7 +282,7 @@ def _digests(path: Path) -> dict[str, str]:
 
 
 def parse_key(text: str, option: str) -> Key:
-    """Return the parts of a key such as `payload.0.mass`. Raises `InputError` for other text."""
+    """Return the parts of a key such as `payload.0.mass`. Raises `InputError` on `option` for other text."""
     parts = tuple(text.strip().split("."))
     if not all(parts) or len(parts) > DEEPEST:
         raise InputError(f"{option}: expected a key such as payload.0.mass", f'"{text[:100]}"')

@@ -88,9 +88,9 @@ class Evaluations:
     def beside(
         self, base: Evaluated, places: Sequence[Place], again: Mapping[Key, Any] | None
     ) -> list[tuple[Reading, ...]]:
-        """Return responses at places close to `base`, those of peaks at its peak times; empty if a design failed.
+        """Return responses at places close to `base`, peaks at the times of its peaks; empty if a design failed.
 
-        `again`: changes with which runs reuse the time steps of `base`.
+        `again`: changes with which runs reuse the time steps of `base`; None: own steps.
         """
         designs = self.designs.run([self.space.point(place) for place in places], again)
         known = [(base.place, design.folder) for design in designs]
@@ -263,7 +263,7 @@ class Optimality:
         residual: largest entry of the gradient of the Lagrangian: relative change of the objective over the range of
             one number, if all were linear.
         gradient_error: largest estimated error in the gradient of the objective, in the same measure.
-        gap: relative decrease of the objective, if all were linear, with no room left in limits that are reached.
+        gap: relative decrease of the objective, if all were linear, by a move to the limits that are almost reached.
         violation: largest excess, relative to its limit.
         kinks: notes on peaks that others exceed close to the design.
     """

@@ -21,7 +21,7 @@ from ..present.lines import print_table
 
 
 class TextTable(NamedTuple):
-    """A table of text: below a `line` in print; in reports its heading begins with `of`."""
+    """A table of text: below a `line` in print; in reports the first heading begins with `of`."""
 
     heading: Sequence[str]
     rows: Iterable[Sequence[str]]

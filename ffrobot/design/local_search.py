@@ -33,7 +33,7 @@ GTOL, XTOL = 1e-7, 1e-9  # of trust-constr
 
 
 class ReachedError(Exception):
-    """Signals that a search is done: the gradient vanishes, or a feasible design is found and no more is wanted."""
+    """Signals that a search is done: the gradient vanishes, or a search for a feasible design has found one."""
 
 
 class StuckError(Exception):
@@ -177,10 +177,10 @@ class Local:
 def search_from(
     start: Place, method: str, differentiation: Differentiation, watcher: Watcher, title: str = ""
 ) -> Local:
-    """Search along gradients from one start by `method` ("slsqp", "trust-constr"), at last with their error estimates.
+    """Search along gradients from one start by `method` ("slsqp", "trust-constr"); `title` precedes its messages.
 
-    SLSQP may stop early where a limit trades for the objective almost linearly; trust-constr then continues. After a
-    design beyond limits, the search reduces the largest excess; it ends if that fails with error estimates.
+    Later passes estimate errors of gradients; the last is by trust-constr, as SLSQP may stop early. After a pass that
+    ends beyond limits, the largest excess is reduced; the search ends if that fails.
     """
     evaluations = differentiation.evaluations
     begun = len(evaluations.searched)
@@ -266,7 +266,7 @@ def combinations(space: DesignSpace) -> int:
 def evolve(evaluations: Evaluations, seed: int, start: Place | None, tell: Callable[[str], None]) -> str:
     """Search by differential evolution, a generation in parallel; return the reason if it ended early, else "".
 
-    `tell`: function for messages on progress.
+    `start`: a design of the first generation; None: all are random. `tell`: function for messages on progress.
     """
     space, problem = evaluations.space, evaluations.problem
     count = len(space.variables)

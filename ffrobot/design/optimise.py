@@ -49,7 +49,7 @@ def find_optimum(
     runs: int,
     tolerance: float,
 ) -> Optimum:
-    """Optimize a scene; arguments as of `ffrobot.optimise`."""
+    """Return the best design of the scene of `runner`; other arguments as of `ffrobot.optimise`."""
     path, problem = runner.path, read_problem(minimise, maximise, subject_to)
     space, table = read_space(path, vary), runner.folder / "designs.csv"
     problem = with_motors(problem, space)

@@ -109,7 +109,7 @@ class History:
     """A dataset over T outputs: `values` (T, columns) in `unit` at `time` (T,), s; of vectors the length, one column.
 
     `largest`, `rms`, `mean`: over all columns and all time steps, also between outputs; NaN if unknown.
-    `is_in_doubt`: whether they are unknown for a component of a vector whose length outputs miss.
+    `is_in_doubt`: for one component of a vector, these are unknown, and outputs miss a part of the vector's length.
     """
 
     name: str
@@ -178,7 +178,7 @@ def read_history(results: Results, name: str, option: str) -> History:
 
 
 def read_column(results: Results, name: str, option: str) -> History:
-    """Return the history `name` as `read_history`. Raises `InputError` also where it has several columns."""
+    """Return the history `name` of one column. Raises `InputError`, with `option` in front, otherwise."""
     history = read_history(results, name, option)
     if (count := history.values.shape[1]) > 1:
         raise InputError(f'{option}: expected one column, such as "{name}[0]"', f'{count} of "{name}"')

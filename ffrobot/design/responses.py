@@ -98,7 +98,7 @@ class OfHistory(Response):
 
 @dataclass(frozen=True)
 class OfSettling(Response):
-    """Residual vibration of a point, m, or the time in which it settles, s; see `mbs.quantities.settling`."""
+    """The "residual" vibration of a point, m, or its "settling" time, s; see `mbs.quantities.settling`."""
 
     what: str
     text: str
@@ -263,13 +263,13 @@ class DesignProblem:
 
     @property
     def responses(self) -> tuple[Response, ...]:
-        """The objective, then that of each limit."""
+        """Response of the objective, then of each limit."""
         return (self.objective, *(limit.response for limit in self.limits))
 
     def scaled(self, values: Sequence[float]) -> Array:
         """Return (1 + m,) scaled objective F, to be minimized, and constraints g ≤ 0, no unit, of values in SI units.
 
-        They are logarithms of value over scale: powers of lengths, as masses and deflections are, become linear.
+        They are logarithms of values over their scales.
         """
         return self._scaled(values)[0]
 

@@ -1,7 +1,7 @@
 """Distributions of keys (`KEY=±2%`, `KEY=normal:SIGMA`, …), and statistics of linear functions of them.
 
-Mean, standard deviation and quantiles of samples have errors of independent samples. The mean of a Latin hypercube is
-better the nearer its quantity is to a sum of functions of one key each (Stein, Technometrics 29, 1987).
+The mean of a Latin hypercube is better the nearer its quantity is to a sum of functions of one key each (Stein,
+Technometrics 29, 1987).
 """
 
 import math
@@ -29,7 +29,7 @@ RESAMPLES = 200  # of a bootstrap
 
 @dataclass(frozen=True)
 class SpreadStatistics:
-    """Statistics of quantities (…) in their units: `mean` (…), `deviation` (…), `quantiles` (3, …) at `LEVELS`.
+    """Statistics of quantities (…) in their units: `mean` (…), `deviation` (…), `quantiles` (3, …): 5, 50, 95 %.
 
     Standard errors of these have the same shapes. `lowest` and `highest` (…) are the worst cases: the least and the
     largest sample.
@@ -64,8 +64,8 @@ class SpreadStatistics:
 def statistics(values: Array) -> SpreadStatistics:
     """Return statistics of n > 1 samples `values` (n, …), in their unit.
 
-    The error of s is √((m₄ − s⁴ (n − 3)/(n − 1))/n)/2s with the fourth central moment m₄; that of a quantile half the
-    distance between the order statistics one standard deviation of the binomial distribution below and above it.
+    Errors are those of independent samples: of the deviation by the fourth central moment, of quantiles by order
+    statistics.
     """
     n = len(values)
     mean, s = values.mean(axis=0), values.std(axis=0, ddof=1)
@@ -151,7 +151,7 @@ WIDE = 2.0  # standard deviations of a normal key within which scenes have to be
 class Spread:
     """Distribution of one key: uniform within `half` of `mean`, or normal with the standard deviation `deviation`.
 
-    `text` is what the user wrote, `own` the value of the scene.
+    `text` is what the user wrote, `own` the value of the scene; numbers are in the unit of the key.
     """
 
     key: Key
@@ -163,12 +163,12 @@ class Spread:
 
     @property
     def half(self) -> float:
-        """Half width of a uniform distribution: √3 standard deviations."""
+        """Half width of a uniform distribution, in the unit of the key: √3 `deviation`."""
         return math.sqrt(3.0) * self.deviation
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Values of the key, in its unit, between which scenes have to be valid: two deviations of a normal one."""
+        """Values of the key, in its unit, between which scenes must be valid; if normal, `mean` ± 2 `deviation`."""
         far = self.half if self.kind == "uniform" else WIDE * self.deviation
         return self.mean - far, self.mean + far
 
@@ -221,11 +221,11 @@ DRAWS = 4096  # of the model, for quantiles: no runs
 
 
 def linear_statistics(spreads: Sequence[Spread], middle: Array, sides: Array) -> tuple[SpreadStatistics, Array]:
-    """Return statistics of responses f = f₀ + Σ d_k δ_k, and shares (…, k), no unit, of the variance by k keys.
+    """Return statistics of linear functions of k keys, and shares (…, k), no unit, of the variance by each key.
 
-    δ_k is in standard deviations of key k. `middle` (…): responses, any unit, at the means; `sides` (k, 2, …): one
-    deviation of each key above and below. Errors are changes by curvatures, ½ Σ c_k δ_k². Worst cases have every key
-    at an end of its spread, a normal one two deviations off.
+    `middle` (…): responses, any unit, with all keys at their means; `sides` (k, 2, …): with one key a standard
+    deviation above and below. Errors: changes of the statistics by curvatures. Worst cases have every key at an end of
+    its spread, a normal one two deviations off.
     """
     above, below = sides[:, 0], sides[:, 1]
     slopes, curvatures = 0.5 * (above - below), above - 2.0 * middle + below

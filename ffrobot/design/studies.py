@@ -45,7 +45,7 @@ class FiniteRange(FloatRange):
 
 
 class RunOptions(TypedDict, total=False):
-    """Options of all studies."""
+    """Options of all studies: number or executor of parallel runs, `retry` of failed ones, Python files, observer."""
 
     processes: Annotated[int, IntRange(1, 1000)]
     executor: "Executor | Batch | None"
@@ -117,7 +117,8 @@ def sensitivity(
             1e-09]
         how: `processes`, runs in parallel here, or `executor`, which performs them: one of `concurrent.futures`,
             `mpi4py.futures` or dask, with processes that import ffrobot. `retry`: whether to repeat designs that failed
-            before. `allow_python`: as in `solve`. `watcher`: an object that observes progress and can stop the study.
+            before. `allow_python`: files and folders whose Python files may run. `watcher`: an object that observes
+            progress and can stop the study.
 
     Returns:
         Derivatives with their errors.
@@ -161,13 +162,13 @@ def optimise(
         output: folder of the designs, which a later call reuses; None: they are not kept.
         minimise: response to minimize, as in sensitivity.
         maximise: response to maximize.
-        subject_to: limit, or with ">=". A sequence, such as ["peak joints.elbow.moment <= 20"].
+        subject_to: limit, "<=" or ">=". A sequence, such as ["peak joints.elbow.moment <= 20"].
         method: the optimizer. "auto" is "slsqp", and with discrete sets "all" of them or "differential-evolution".
         starts: searches along gradients. They begin at the scene and at points of a Latin hypercube.
         seed: seed of random numbers.
         runs: largest number of runs.
         tolerance: tolerance of the runs, if the scene has a larger one.
-        how: as in `sensitivity`.
+        how: options of the runs, as in `sensitivity`.
 
     Returns:
         The best design; if none satisfies the limits, the nearest one, with `feasible` False.
@@ -220,7 +221,7 @@ def trade_off(
         subject_to: limits, as in `optimise`.
         runs: largest number of runs of all searches together.
         tolerance: tolerance of the runs, if the scene has a larger one.
-        how: as in `sensitivity`.
+        how: options of the runs, as in `sensitivity`.
 
     Returns:
         The designs of the front.
@@ -265,7 +266,7 @@ def uncertainty(
         seed: seed of the samples.
         by: "samples", or "gradients" with two runs per key.
         indices: Sobol indices, with N/2 more runs per parameter.
-        how: as in `sensitivity`.
+        how: options of the runs, as in `sensitivity`.
 
     Returns:
         Mean, deviation and quantiles of responses, and bands of histories.

@@ -87,7 +87,7 @@ class DesignVariable:
     def step(self, u: float, relative: float) -> float:
         """Return a step of u that changes the number x by `relative` of itself, or of the range if that is smaller.
 
-        Near x = 0 it changes x by that of a thousandth of the range.
+        Near x = 0, x changes by `relative` of a thousandth of the range.
         """
         span = self.high - self.low
         return float(relative * np.clip(abs(self.values(u)[0]), 1e-3 * span, span) / self.slope(u))
