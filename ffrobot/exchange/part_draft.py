@@ -26,8 +26,8 @@ def draft_link(part: Inspection, file: Path, name: str, folder: Path, density: f
     """Return a draft of the link file `name` in `folder` for the part in `file`.
 
     Root and tip are two bores across the part, else its plane ends; other plane faces and bores become comments.
-    Concentrated masses of a file in m are on the nearest of these. The stiffness is that of the metal nearest to
-    `density` (kg/m³), by default aluminum. Raises `InputError` where nothing can be root and tip.
+    Concentrated masses, of a file in the unit m alone, are on the nearest face. The stiffness is that of the metal
+    nearest to `density` (kg/m³), by default aluminum. Raises `InputError` where nothing can be root and tip.
     """
     root, tip = _ends(part)
     axes, length = _frame(part, root, tip)

@@ -40,8 +40,7 @@ VALUE = r'("[^"\n]*"|[^\s,}\]#]+)'  # a text or a number
 def with_values(text: str, changes: Mapping[Key, float | str]) -> str:
     """Return the TOML `text` with other values of keys that are in it.
 
-    Values are replaced in place, which parsing the result confirms; where that is impossible, as in lists, the tables
-    are written anew, without comments.
+    Values are replaced in place; where that is impossible, as in lists, the tables are written anew, without comments.
     """
     for key, value in changes.items():
         wanted = deepcopy(tomllib.loads(text))
@@ -58,7 +57,7 @@ def with_values(text: str, changes: Mapping[Key, float | str]) -> str:
 
 
 class LinkTarget:
-    """Eigenmodes of the link file at `path` under its reference condition."""
+    """Eigenmodes of the link file at `path` under its reference condition, in `families` such as bending."""
 
     families: tuple[str, ...] = FAMILIES
 
@@ -90,7 +89,7 @@ def _beside(path: Path, output: Path | None) -> Path:
 
 
 class RobotTarget:
-    """Vibrations of the scene at `path` about the equilibrium at t = 0, with `motors` "free" or "locked"."""
+    """Vibrations of the scene at `path` about the equilibrium at t = 0, `motors` "free" or "locked"; no `families`."""
 
     families: tuple[str, ...] = ()
 
@@ -102,7 +101,7 @@ class RobotTarget:
         self._links = {name: path.parent / link for name, link in bodies.items() if isinstance(link, str)}
 
     def scene(self, changes: Mapping[Key, float], kind: str, initial: Mapping[str, object] | None = None) -> Scene:
-        """Return the scene with some values changed, one analysis of a `kind`, and other entries of [initial].
+        """Return the scene with some values changed, one analysis of a `kind`, and entries `initial` of [initial].
 
         Raises `InputError` for impossible values.
         """
@@ -236,7 +235,7 @@ class VariedKeys:
         self.start = np.array([self._starts[group[0]] for group in self._groups])
 
     def changes(self, values: Array) -> dict[Key, float]:
-        """Return the values of all keys from those (n,) of their first ones, in their units."""
+        """Return the values of all keys by `values` (n,) of the first key of each text, in their units."""
         pairs = zip(self._groups, values / self.start, strict=True)
         return {key: float(self._starts[key] * c) for group, c in pairs for key in group}
 
@@ -251,7 +250,7 @@ class VariedKeys:
 
     @property
     def written(self) -> tuple[Path, ...]:
-        """The files that `write` makes, that of the target last."""
+        """The files that `write` makes, that of the link or scene last."""
         return tuple(self.target.files(self._starts, self._place))
 
     def check_new(self, *, replace: bool) -> None:

@@ -157,7 +157,7 @@ class PoseModel:
         self._rest: Array | None = None  # the first equilibrium
 
     def at(self, robot: Solution) -> Array:
-        """Return the `stacked` equations (3 f + r, f) of a robot about its equilibrium in the pose, SI units.
+        """Return M, K, D (f, f), J (r, f) of a robot about its equilibrium in the pose, SI units: an array (`stacked`).
 
         Raises `InputError` for unknown points, `SolveError` without an equilibrium.
         """
@@ -313,9 +313,9 @@ class _Residuals:
 
 
 def differentiated(equations: Equations, values: Array, place: Sequence[Array]) -> list[list[Array]]:
-    """Return forward differences of `stacked` equations by pose and parameter, per unit of the parameter.
+    """Return derivatives of the poses' equations, [pose][parameter], by forward differences per unit of parameter.
 
-    `place`: the equations of all poses at the parameters' `values` (n,).
+    `place`: M, K, D, J of each pose in one array (`stacked`), as `equations` returns them at parameters `values` (n,).
     """
     found = []
     for step in np.diag(STEP * values):
@@ -342,7 +342,8 @@ def fit_receptances(
 ) -> ResponseFit:
     """Find the parameters, from `start` (n,) on, whose FRFs are nearest to those measured in `poses`.
 
-    `equations` returns those of `poses`, in their order; poses for validation are only compared.
+    `equations` returns M, K, D, J of each pose in one array (`stacked`) for parameters (n,) in units of `keys`. Poses
+    for validation are only compared.
 
     Raises:
         InputError: all poses are for validation, or FRFs do not distinguish the parameters.

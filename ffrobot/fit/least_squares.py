@@ -89,7 +89,7 @@ class Fit(Parameters):
     def coverage_factor(self, probability: float) -> float:
         """Return the half width of a confidence interval of this probability, in standard deviations.
 
-        Student's t where the deviation is estimated from the remaining errors (JCGM 100:2008, G.3), or NaN.
+        By Student's t where deviations are estimated from remaining errors (JCGM 100:2008, G.3); NaN if none remain.
         """
         freedom = self.degrees_of_freedom
         return float(scipy.stats.t.ppf(0.5 + 0.5 * probability, np.inf if freedom is None else freedom))
@@ -101,7 +101,7 @@ class Fit(Parameters):
 
     @property
     def misfit(self) -> float:
-        """√(χ²/(m − n)) of m frequencies and n parameters, about 1 for a right model; NaN without uncertainties."""
+        """√(Σ (error/uncertainty)²/(m − n)) with n parameters: about 1 for a right model; NaN without uncertainties."""
         spare = len(self.measured) - len(self.keys)
         if self.uncertainty is None or spare == 0:
             return np.nan
@@ -148,7 +148,8 @@ def fit_frequencies(
 ) -> Fit:
     """Find the parameters, from `start` (n,) on, whose frequencies are nearest to the `measured` ones (m,), Hz.
 
-    `uncertainty` (m,): their standard deviations, Hz. `keys` and `labels` name parameters and modes.
+    `frequencies` returns those (m,), Hz, of parameters (n,). `uncertainty` (m,): standard deviations of `measured`, Hz.
+    `keys` and `labels` name parameters and modes.
 
     Raises:
         InputError: fewer frequencies than parameters, or parameters that they cannot distinguish.
@@ -197,6 +198,7 @@ def check_distinguishable(
     """Raise `InputError` for parameters `keys`, or combinations, without effect on residuals: null vectors of J.
 
     J (m, n), m ≥ n: derivatives by the logarithms of parameters, no unit. `least`: smallest relative effect.
+    `measured`: word for the measurement in messages.
     """
     _, values, V = np.linalg.svd(J, full_matrices=False)
     sizes = np.linalg.norm(J, axis=0)

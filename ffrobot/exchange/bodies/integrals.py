@@ -67,13 +67,13 @@ class ShapeIntegrals:
 
     @property
     def gyroscopic(self) -> Array:
-        """Return G_r (3, 3, n) = 2 (Ī_aa 1 − Īᵀ), √kg·m: the gyroscopic moment is G_r q̇ ω."""
+        """Return G_r (3, 3, n), √kg·m, for the gyroscopic moment Σ_l G_rl q̇_l ω: 2 (tr Ī 1 − Īᵀ) of Ī = `I_bar`."""
         I_bar = self.I_bar
         return 2 * (np.trace(I_bar) * np.eye(3)[:, :, None] - I_bar.transpose(1, 0, 2))
 
     @property
     def centrifugal(self) -> Array:
-        """Return O_e of the undeformed body (n, 6), √kg·m: ∫ρ Φ_lᵀ ω~ω~ x dV = −½ J_l of squares, −J_l of products."""
+        """Return O_e (n, 6), √kg·m: factors of ω_a ω_b (`PAIRS`) in ∫ρ Φ_lᵀ ω~ω~ x dV of the undeformed body."""
         return np.stack([-(0.5 if a == b else 1.0) * self.inertia_slope[a, b] for a, b in PAIRS], axis=1)
 
     @property
@@ -125,7 +125,7 @@ def integrals_of(body: ModalBody) -> ShapeIntegrals:
 
 
 def slopes(S: Array) -> dict[str, Array]:
-    """Return `spin_slope` (3, n, n), `centrifugal_slope` (6, n, n) by S (3, 3, n, n), Shabana's S̄_kl; no unit."""
+    """Return fields `spin_slope` (3, n, n) and `centrifugal_slope` (6, n, n) by `S_bar_kl` (3, 3, n, n); no unit."""
     centrifugal = [S[a, a] - np.trace(S) if a == b else S[a, b] + S[b, a] for a, b in PAIRS]
     spin = np.einsum("abc,bckl->alk", LEVI_CIVITA, S)
     return {"spin_slope": spin, "centrifugal_slope": np.array(centrifugal)}
@@ -241,7 +241,7 @@ NOT_IN_THE_FILE = (
 def modal_body(name: str, integrals: ShapeIntegrals, nodes: Nodes, text: str) -> tuple[ModalBody, tuple[str, ...]]:
     """Return a modal body, with modes of unit mass, of integrals and nodes in a file; and remarks on losses.
 
-    `text` may contain a `note`. Raises `InputError` for masses or stiffnesses that contradict each other.
+    `text`: the file's, perhaps with a `note`. Raises `InputError` for masses or stiffnesses that contradict each other.
     """
     condition, numbers = _noted(text, nodes)
     integrals, remarks = _with_agreed_masses(integrals)

@@ -70,11 +70,11 @@ LOST = (
 
 
 def craig_bampton_file(body: ModalBody) -> tuple[bytes, tuple[str, ...]]:
-    """Return an .npz file with matrices M, K, C (c, c), SI units, and remarks on what they lack.
+    """Return an .npz file with matrices M, K, C (c, c), SI units, and remarks on losses.
 
     The c `coordinates` are displacements and rotations (m, rad) of the i `interfaces` at `origins` (i, 3), m, then
     modal ones. `recovery` (3 k, c): displacements of k `points` (k, 3), m, per unit of coordinates. Raises
-    `InputError` for other bodies.
+    `InputError` for bodies with other modes.
     """
     if body.reference_condition != CONDITION:
         raise InputError(

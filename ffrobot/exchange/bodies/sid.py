@@ -233,7 +233,7 @@ def _parse(text: str) -> tuple[str, SidObject]:
 
 
 class Modal:
-    """Object `modal` of a SID_FEM file: `root`, number of `modes`, `nodes`; `modal[NAME]` is a matrix."""
+    """Object `modal` of a SID_FEM file: its content `root`, number of `modes`, `nodes`; `modal[NAME]` is a matrix."""
 
     def __init__(self, root: SidObject) -> None:
         self.root, self.modes = root, int(root["refmod"].number("nelastq"))

@@ -71,7 +71,7 @@ def linear_fmu(path: Path, analysis: str | None) -> tuple[bytes, str, tuple[str,
 
 
 def c_table(path: Path, analysis: str | None) -> tuple[str, str, tuple[str, ...], str]:
-    """Return a C header with A, B, C, D (all of a schedule), and the rest as `linear_fmu`."""
+    """Return a C header with A, B, C, D of an analysis (default: the first), a summary, remarks, the analysis' name."""
     unit, models, remarks, name = _unit(path, analysis)
     return _header(unit, models), _what(name, unit), tuple(remarks), name
 
@@ -113,7 +113,7 @@ def _unit(path: Path, analysis: str | None) -> tuple[Unit, list[StateSpace], lis
 
 
 def make_unit(scene: str, analysis: str, model: StateSpace, units: Mapping[str, str]) -> Unit:
-    """Return the FMU's names, variables and matrices of a model; `units`: see `joint_units`."""
+    """Return the FMU's names, variables and matrices of a model; `units`: "rad" or "m" by joint coordinate."""
     states, inputs, outputs = linear_variables(model, units)
     return Unit(
         identifier=identifier_of(scene, analysis),
@@ -147,7 +147,7 @@ def joint_units(scene: Mapping[str, Any]) -> dict[str, str]:
 def linear_variables(
     model: StateSpace, units: Mapping[str, str]
 ) -> tuple[tuple[Variable, ...], tuple[Variable, ...], tuple[Variable, ...]]:
-    """Return variables of states, inputs and outputs; `units`: see `joint_units`.
+    """Return variables of states, inputs and outputs; `units`: "rad" or "m" by joint coordinate.
 
     Names in FMUs are unique: a motor is "joint/NAME/moment", as "joint/NAME" is an output; a state with the name of
     an output has the prefix "state ", a sensor patch "measured ".

@@ -124,8 +124,7 @@ def _with_mass(
 def least_change(inertia: Array) -> Array:
     """Return the inertia (3, 3), kg·m², nearest to `inertia` (Frobenius norm) with principal moments J₃ ≤ J₁ + J₂.
 
-    Principal axes stay. With d = J₃ − J₁ − J₂ > 0 the moments become J₁ + d/3, J₂ + d/3, J₃ − d/3. Negative ones may
-    stay negative.
+    Principal axes stay; negative moments may stay negative.
     """
     moments, axes = np.linalg.eigh((inertia + inertia.T) / 2)
     excess = max(moments[2] - moments[0] - moments[1], 0.0)

@@ -141,8 +141,8 @@ class Filling:
 def with_masses(robot: Robot, urdf: Path, filling: Filling) -> tuple[Robot, list[str]]:
     """Return the robot with masses of links that lack them, by `filling` of their shapes; and a remark on each.
 
-    Collision shapes are preferred, as they are usually closed and simple. The root is fixed and needs no mass. Raises
-    `InputError` for unreadable meshes and shapes without a volume.
+    Collision shapes are preferred. The root needs no mass. Raises `InputError` for unreadable meshes and
+    shapes without a volume.
     """
     links, remarks = dict[str, UrdfLink](robot.links), list[str]()
     for name, link in robot.links.items():
