@@ -122,7 +122,7 @@ class MapPlan:
 
     @property
     def turned_about(self) -> Array | None:
-        """Unit vector (3,), axes of the tool, else global ones, about which the grid turns it; None without turns."""
+        """Unit vector (3,) about which the grid turns a tool, in its axes, else global ones; None without turns."""
         if self.milling is None or TURN not in [axis.name for axis in self.axes]:
             return None
         return np.array(self.milling.axis) / np.linalg.norm(self.milling.axis)

@@ -53,7 +53,7 @@ class Milling(Record):
     entry: Quantity
     """Angle at which a tooth enters the cut, from the normal to the feed, rad: 0 of up milling."""
     exit: Quantity
-    """Angle at which it leaves the cut, rad: π of down milling."""
+    """Angle at which a tooth leaves the cut, rad: π of down milling."""
     axis: Direction = (0.0, 0.0, 1.0)
     """Axis of the tool, from the cut into the spindle, in the axes of the point (without own ones: global axes)."""
     feed: Direction | None = None
@@ -72,7 +72,7 @@ class Milling(Record):
         return self
 
     def mean_forces(self, first: Array, last: Array) -> Array:
-        """Return means (…, 2, 2), N/m², of one tooth's cutting forces per depth of cut and displacement.
+        """Return means (…, 2, 2), N/m², of a tooth's force per depth of cut and displacement, along feed and normal.
 
         The means are over the tooth's angles from `first` to `last` (…), rad, within [0, 2π].
         """
@@ -87,11 +87,11 @@ class Milling(Record):
 
     @property
     def average(self) -> Array:
-        """Mean C̄ (2, 2), N/m², over a turn, of the cutting forces of all teeth per depth of cut and displacement."""
+        """Mean C̄ (2, 2), N/m², over a turn: force of all teeth per depth and displacement, along feed and normal."""
         return self.teeth * self.mean_forces(np.array(0.0), np.array(2 * np.pi))
 
     def feeds(self, axes: Array) -> Array:
-        """Return unit vectors (n, 2, 3), global axes, along n feeds and normal to each; their product is the tool axis.
+        """Return unit vectors (n, 2, 3), global axes, along n feeds and normal to each; feed × normal is the tool axis.
 
         `axes` (3, 3): rows are axes of the point, global axes. Raises `InputError` for a feed along the tool's axis.
         """
@@ -116,7 +116,7 @@ def stable_depths(milling: Milling, free: FreeCoordinates, J: Array, axes: Array
 
     J (d, f): displacements of the tip, global axes, by the f coordinates of which `free` are combinations; SI units.
     `axes` (3, 3): axes of the tip in rows. `milling_best_depth`, m, is of the best feed, `milling_feed` (3,).
-    `milling_lobes` (S,), m, at S speeds: by averaged forces of the worst feed there, else that of `milling_depth`.
+    `milling_lobes` (S,), m, at S speeds: with averaged forces, of the worst feed at each; else of the worst feed above.
     """
     values, V = np.linalg.eigh((free.K + free.K.T) / 2)
     V = V[:, values < (2 * np.pi * milling.highest) ** 2]
@@ -152,7 +152,7 @@ THINNEST = 1e-12  # m: below it no depth is stable
 
 
 class Tip(NamedTuple):
-    """Vibrations q̈ + D q̇ + K q = Jᵀ F of a tip with r = J q, m: K, D (m, m) for unit masses, J (d, m), SI units."""
+    """Vibrations q̈ + D q̇ + K q = Jᵀ F, r = J q of a tip in n modes of unit mass: K, D (n, n), J (d, n), SI units."""
 
     K: Array
     D: Array
@@ -236,8 +236,7 @@ def growth(tip: Tip, cutter: Milling, depth: float, speed: float) -> float:
     """Return the largest factor by which small vibrations grow in a tooth period, above 1 with chatter.
 
     By semi-discretization (T. Insperger and G. Stépán, Int. J. Numer. Meth. Engng 61, 2004). `depth` in m, `speed` of
-    the spindle in rad/s. Cubics interpolate displacements one tooth period ago, so that a wave needs few steps. Raises
-    `InputError` for too many waves in a tooth period.
+    the spindle in rad/s. Raises `InputError` for too many waves in a tooth period.
     """
     (K, D, J), m, pitch = tip, len(tip.K), 2 * np.pi / cutter.teeth
     fastest = float(np.sqrt(np.abs(np.linalg.eigvals(K)).max(initial=0.0)))
@@ -257,6 +256,7 @@ def growth(tip: Tip, cutter: Milling, depth: float, speed: float) -> float:
     now, before = start[: 2 * m], deque(start[2 * m :].reshape(steps + 1, 2, -1), steps + 1)  # the newest r first
     for moved in scipy.linalg.expm(A * pitch / speed / steps)[:, : 2 * m]:
         rise = before[-3] - before[-2]
+        # cubics, for few steps per wave
         first = (13 * (before[-2] + before[-3]) - before[-1] - before[-4]) / 24 - rise / 2
         before.appendleft(J @ now[:m])
         now = moved @ np.vstack([now, first, rise])

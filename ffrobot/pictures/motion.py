@@ -160,7 +160,7 @@ def largest_deflection(bodies: Iterable[MovingBody]) -> float:
 def visible_exaggeration(size: float, deflection: float) -> float:
     """Return the largest of 1, 2, 5, … 1000 for which `deflection` (m) is at most 5 % of the mechanism's `size` (m).
 
-    1 if even 1000 times the deflection is invisible, as in rigid robots.
+    1 if even 1000 times the deflection is invisible.
     """
     steps = [] if 1000.0 * deflection < INVISIBLE * size else [2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0]
     return max((s for s in steps if s * deflection <= VISIBLE_DEFORMATION * size), default=1.0)
@@ -184,7 +184,7 @@ class PointTarget:
 
 
 def targets(results: Results, analysis: str) -> list[PointTarget]:
-    """Return the target of every trajectory of a point, over the first outputs of the analysis.
+    """Return the target of every trajectory of a point, at the first outputs, as far as it is known.
 
     Targets of a forward analysis are those of the analysis from which its actuation comes.
     """

@@ -85,9 +85,8 @@ def triangles_of(cells: Integers) -> Integers:
 def coarsened(points: Array, triangles: Integers, limit: int) -> tuple[Indices, Integers]:
     """Reduce a surface of points (p, 3), m: return indices (k,) of those kept and at most `limit` triangles (t, 3).
 
-    Points in the same box of a grid become the one nearest to their mean (vertex clustering: Rossignac & Borrel, 1993),
-    so that the points that remain keep their exact displacements. Boxes are as small as the limit allows, and across a
-    slender link never larger than a quarter of it.
+    Points in the same box of a grid become the one nearest to their mean (vertex clustering: Rossignac & Borrel, 1993)
+    and keep their exact displacements.
     """
     used, inverse = np.unique(triangles, return_inverse=True)
     if len(triangles) <= limit:
@@ -154,21 +153,21 @@ OCTAHEDRON = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3
 
 @struct
 class Shape:
-    """Points of a `body`, moved by coordinates p and exaggeration s: x + s Φ p."""
+    """The k points of a `body`, moved by coordinates p and exaggeration s: x + s Φ p."""
 
     body: MovingBody
-    points: Array  # (p, 3) x, in the frame, in m
-    shapes: Array  # (p, 3, n) Φ, displacement in m per unit of coordinate
+    points: Array  # (k, 3) x, in the frame, in m
+    shapes: Array  # (k, 3, n) Φ, displacement in m per unit of coordinate
     coordinates: Array  # (T, n) over the outputs
     cells: Integers  # (c, v) points that make a line (v = 2) or a facet
 
     @property
     def deflection(self) -> Array:
-        """Return the deflection A Φ p of all points (T, p, 3), m, global axes."""
+        """Return the deflection Φ p of all points (T, k, 3), m, in global axes."""
         return self.body.turned(np.einsum("pin,tn->tpi", self.shapes, self.coordinates, optimize=True))
 
     def placed(self, s: float = 1.0) -> Array:
-        """Return positions of the points (T, p, 3), m, global axes, with deflections times s and closed joints."""
+        """Return positions of the points (T, k, 3), m, global axes, with deflections times s and closed joints."""
         rest = self.body.placed(np.broadcast_to(self.points, (len(self.coordinates), *self.points.shape)))
         places: Array = rest + s * self.deflection
         return places if s == 1.0 else places + (s - 1.0) * self.body.shift[:, None]
@@ -177,7 +176,7 @@ class Shape:
 def surface_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape:
     """Return the surface of a flexible body, the visual shapes of a rigid one; else lines between points.
 
-    `notes` say which files are not found.
+    Adds to `notes` the files that cannot be drawn.
     """
     if body.modal is None and (visual := _visual_shape(results, body, notes)) is not None:
         return visual
@@ -189,7 +188,7 @@ def surface_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape
 
 
 def coarse_surface(results: Results, body: MovingBody, size: float, limit: int, notes: list[str]) -> Shape:
-    """Return the surface of a body in at most `limit` triangles, its lines as bars for a robot of `size` (m)."""
+    """Return `surface_shape` in at most `limit` triangles, lines as bars that suit a robot of `size` (m)."""
     shape = thickened(surface_shape(results, body, notes), 0.008 * size)
     kept, triangles = coarsened(shape.points, triangles_of(shape.cells), limit)
     return replace(shape, points=shape.points[kept], shapes=shape.shapes[kept], cells=triangles)
@@ -202,7 +201,7 @@ def numbered_cells(shapes: Sequence[Shape]) -> list[Integers]:
 
 
 def line_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape:
-    """Return the line through the stations of a flexible body; without its file, `point_shape` and a note."""
+    """Return the line through the stations of a flexible body; without its file, `point_shape` and one of `notes`."""
     link = _modal_body(results, body, notes)
     if link is None or body.modal is None:
         return point_shape(body)

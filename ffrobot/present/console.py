@@ -85,7 +85,7 @@ class Display(Watcher):
         self._task = self._progress.add_task(title, total=None)
 
     def stopping(self, number: int) -> None:
-        """Announce at once that the run is stopping, since evaluation and output may take a while."""
+        """Announce that the run is stopping."""
         super().stopping(number)
         # not by Python's streams, which the signal may have interrupted
         os.write(sys.stderr.fileno(), b"ffrobot: stopping, and keeping what was computed (again: not keeping it)\n")

@@ -20,7 +20,7 @@ from .lines import plain_table, print_table
 
 
 def feasibility_tables(path: Path, analysis: str | None) -> Group:
-    """Return tables of loads and limits of motors and patches in one or all analyses. Raises `InputError` for none."""
+    """Return tables of loads and limits of actuators in one or all analyses. Raises `InputError` if there are none."""
     with Results(path) as results:
         judged = [name for name in results.analyses if results.has(f"{name}/feasibility")]
         if not judged:

@@ -36,7 +36,7 @@ TAKEN = COLORS[3]  # no color of a tool
 
 
 def write_motion(results_path: Path, path: Path, options: MovieOptions | None = None) -> list[str]:
-    """Write a movie drawn by matplotlib; arguments and notes as in `make_movie`."""
+    """Write a movie of a results file by matplotlib; return notes on simplifications (`make_movie`)."""
     with style():
         return make_movie(results_path, path, options, _Frames)
 

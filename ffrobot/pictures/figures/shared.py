@@ -53,7 +53,7 @@ NEEDED = {
 
 
 class FigureRecord(Record):
-    """One figure. Axes without a range take that of the data; units are in the labels of the axes.
+    """One figure; units are in the labels of its axes.
 
     Kinds: "time" draws its curves over time. "path" draws (x, y) or (x, y, z) datasets as paths. "configurations" draws
     the bodies of `analysis` at `times` (s), and its curves as paths, by default those of points with trajectories.

@@ -47,7 +47,7 @@ SUPERSCRIPTS = str.maketrans("−0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 class Ticks(ScalarFormatter):
-    """Labels of ticks as plain text, which saves a seventh of the time to draw a figure."""
+    """Labels of ticks as plain text, which is faster to draw."""
 
     def get_offset(self) -> str:
         """Return the power of ten of all labels, "×10⁻⁵"."""
@@ -72,7 +72,7 @@ def new_axes(title: str) -> tuple[Figure, Axes]:
 
 
 def line_style(k: int, points: int, *, alone: bool = False) -> dict[str, Any]:
-    """Return the style of the k-th curve, of `points`: sparse markers and dashes distinguish equal curves.
+    """Return the style of curve k with so many `points`: sparse markers and dashes distinguish equal curves.
 
     A curve that is `alone` has none, as they look like samples.
     """

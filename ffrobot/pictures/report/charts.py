@@ -65,7 +65,7 @@ MAX_POINTS = 4000  # of a curve; more cannot be told apart on a screen
 FAR = 10  # times the largest value of a chart: higher limits would flatten its curves
 LIMIT_LINE = {"color": LIMIT, "dash": "dash", "width": 1.5}
 DASHES = ("solid", "dash", "dashdot", "dot")
-# Violet to green (viridis, its dark end brighter: dark pages), for series with an order: patches along a link, modes.
+# Violet to green (viridis, its dark end brighter: dark pages), for series with an order.
 SHADES = np.array([[165, 90, 200], [65, 115, 175], [33, 145, 140], [94, 201, 98]], dtype=float)
 
 

@@ -118,7 +118,7 @@ def axis_of_response(label: str, values: Numbers, limit: float | None = None, se
 
 
 class Parallel(Drawing):
-    """Parallel coordinates (Inselberg 1985): a line for each design over variables, responses and limits."""
+    """Parallel coordinates (Inselberg 1985): a line over `axes` for each design, styled by its state."""
 
     kind: Literal["parallel"] = "parallel"
     axes: tuple[DesignAxis, ...]

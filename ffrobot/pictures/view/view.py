@@ -312,7 +312,7 @@ def _draw(pictures: Sequence[Picture], folder: Path) -> list[Path]:
 
 
 def view_movie(results_path: Path, path: Path, options: MovieOptions | None = None) -> list[str]:
-    """Write a movie rendered by PyVista; arguments and notes as in `make_movie`."""
+    """Write a movie of a results file by PyVista; return notes on simplifications (`make_movie`)."""
     if is_modal_body_file(results_path):
         raise InputError(f"{results_path}: movie: expected a results file", "a modal body: it does not move")
     return make_movie(results_path, path, options, _rendered)
