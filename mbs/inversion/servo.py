@@ -130,7 +130,10 @@ class Servo:
         return r
 
     def forces(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array]:
-        """Residual modal forces r (N, n), N/√kg, and motor torques τ (N, motors), N·m or N; p, ṗ, p̈ as `residuals`."""
+        """Residual modal forces r (N, n), N/√kg, and motor torques τ (N, motors), N·m or N.
+
+        At `times` (N,), s; p, ṗ = v and p̈ = a are (N, n), m·√kg and s.
+        """
         states = self.motion.motion(times.tolist(), p, v, a, self.postures(times))
         return states.left[:, self.of_modes], states.tau
 
@@ -144,7 +147,7 @@ class Servo:
         return np.flatnonzero(~self.model.tree.joint_columns)
 
     def slopes(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
-        """Derivatives (N, n + motors, n), SI units, of (r, τ) of `forces` by p̈, ṗ and p."""
+        """Derivatives (N, n + motors, n), SI units, of residual modal forces and motor torques by p̈, ṗ and p."""
         return left_slopes(self.model, self.motion, (p, v, a), times, self.postures(times))
 
 

@@ -37,7 +37,7 @@ class LinearDynamics:
 
 
 def linear_dynamics(servo: Servo, times: Array, p: Array, v: Array, a: Array) -> LinearDynamics:
-    """Derivatives of r at N `times` (N,), s, with p, ṗ = v, p̈ = a (N, n), m·√kg and s."""
+    """Derivatives of residual modal forces at N `times` (N,), s, with p, ṗ = v, p̈ = a (N, n), m·√kg and s."""
     return LinearDynamics(times, *(x[:, : p.shape[1]] for x in servo.slopes(times, p, v, a)))
 
 
@@ -104,10 +104,7 @@ class Linearisation:
 
     @cached_property
     def zeros(self) -> ComplexArray:
-        """Zeros (N, 2n) from motors to path, 1/s, at each time: those on the left first, the slowest of each side.
-
-        Sizes of pairs ± s differ by round-off alone: sides do not.
-        """
+        """Zeros (N, 2n) from motors to path, 1/s, at each time: those on the left first, the slowest of each side."""
         s = np.linalg.eigvals(first_order(self.dynamics, self.scale)).astype(complex)
         side: Array = is_unstable(s).astype(int) - is_unstable(-s)
         return np.take_along_axis(s, np.lexsort((s.imag, np.abs(s), side), axis=1), axis=1)
@@ -116,9 +113,8 @@ class Linearisation:
     def is_future(self) -> Booleans:
         """Whether zeros (N, 2n) belong to motions that the future determines.
 
-        Those in the right half plane; lightly damped vibrations, whose zeros may cross the imaginary axis along the
-        path, only where they grow too far over all of it (docs/theory.md, Torque-only tracking). A zero that passes
-        through infinity counts at each time by itself. So do conjugates of which the future determines only one.
+        Those in the right half plane do. Zeros of lightly damped vibrations may cross the imaginary axis along the
+        path: they do only where they grow too far over all of it (docs/theory.md, Torque-only tracking).
         """
         places, jumps = self._followed
         s, T = np.take_along_axis(self.zeros, places, axis=1), float(self.times[-1])
@@ -166,7 +162,7 @@ class Linearisation:
 
 
 def shape_along(servo: Servo, times: Array) -> Array:
-    """Quasi-static modal coordinates p (N, n), m·√kg, of links at `times` (N,), s: r(t, p, 0, 0) = 0.
+    """Quasi-static modal coordinates p (N, n), m·√kg, of links at `times` (N,), s: residual forces are zero.
 
     Raises `SolveError` where links are too soft.
     """

@@ -25,15 +25,15 @@ class RobotModes:
     """The f modes of a robot, slowest first; two real poles that follow each other make one."""
 
     poles: ComplexArray  # (f, 2) complex, 1/s
-    # (f, s) complex, δs of the first pole's eigenvector by mode, of unit kinetic amplitude (δsᴴ M δs = 1) and with its
-    # largest entry real
+    # (f, s) complex, by mode the increments δs of s independent coordinates in the first pole's eigenvector, of unit
+    # kinetic amplitude (δsᴴ M δs = 1) and with its largest entry real
     shape: ComplexArray
     motion: ComplexArray  # (f, coordinates) complex, the same as δq of all bodies
-    round_off: float  # 1/s, by which a double pole at 0 may be off: `RIGID` √‖K̂‖
+    round_off: float  # 1/s, by which a double pole at 0 may be off
 
     @property
     def frequency(self) -> Array:
-        """Undamped frequencies (f,) √(λ₁ λ₂)/2π, Hz; 0 for motion without stiffness, or falling."""
+        """Undamped frequencies (f,) √(λ₁ λ₂)/2π, Hz, of pairs of poles; 0 for motion without stiffness, or falling."""
         omega = np.sqrt(self.poles.prod(axis=1).real.clip(min=0.0))
         return np.where(omega < RIGID * omega.max(initial=0.0), 0.0, omega) / (2 * np.pi)
 
@@ -45,7 +45,7 @@ class RobotModes:
 
     @property
     def damping_ratio(self) -> Array:
-        """Damping ratios (f,) −(λ₁ + λ₂)/2ω; NaN for frequency 0."""
+        """Damping ratios (f,) −(λ₁ + λ₂)/2ω of pairs of poles; NaN for frequency 0."""
         omega = 2 * np.pi * self.frequency
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio: Array = np.where(omega > 0.0, -self.poles.sum(axis=1).real / (2 * omega), np.nan)
@@ -55,7 +55,7 @@ class RobotModes:
 def robot_modes(K: Array, D: Array, back: Array, transformation: Array) -> RobotModes:
     """Poles and shapes of z̈ + D̂ ż + K̂ z = 0, where K̂, 1/s², and D̂, 1/s, are (f, f).
 
-    `back` (s, f) takes z to δs, and `transformation` (coordinates, s) takes δs to δq.
+    `back` (s, f) takes z to s independent coordinates, `transformation` (coordinates, s) these to δq of all bodies.
     """
     f = len(K)
     if np.any(D):
@@ -86,7 +86,10 @@ def _pairs(poles: ComplexArray) -> Indices:
 
 
 class FreeCoordinates(NamedTuple):
-    """Free coordinates z (m,) with NᵀM N = 1: δs = N z, N (f, m), K = NᵀK N, 1/s², and D = NᵀD N, 1/s, (m, m)."""
+    """Coordinates z (m,) that joint conditions leave free: δs = N z, N (f, m), of f independent coordinates s.
+
+    With z the mass matrix is the identity, the stiffness K, 1/s², and the damping D, 1/s, (m, m).
+    """
 
     N: Array
     K: Array

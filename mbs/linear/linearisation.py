@@ -63,8 +63,8 @@ class LinearEquations:
 
     `model` has no trajectories; its gears are compliant where its tree says so. Independent are motors' coordinates
     where loops leave them so, then other joint coordinates, and modes, those first that the loops determine worst at
-    `q` (n_q,) (QR with pivoting). At `points`, "BODY.POINT" of the scene, forces are inputs and places outputs; as a
-    mapping, they have their points of the model (of links in pieces).
+    `q` (n_q,) (QR with pivoting). At `points`, "BODY.POINT" of the scene, forces are inputs and places outputs; a
+    mapping names the model's point for each (of links in pieces).
     """
 
     def __init__(self, model: Model, q: Array, points: Sequence[str] | Mapping[str, str] = ()) -> None:

@@ -76,8 +76,8 @@ class PoseEvaluator:
     def at(self, q: Array) -> dict[str, Array]:
         """Findings by name in the undeformed posture q (n_q,), SI. Raises `SolveError` where there is no equilibrium.
 
-        In a space of d axes and k ways, of the point: `place` and `sag` (d,) m, `manipulability`, √det(J Jᵀ) of its
-        velocity by the rates of joints with motors (Yoshikawa, 1985); by "joints_locked/…" and "joints_compliant/…":
+        Of the point, with d axes, k translations and rotations: `place` and `sag` (d,) m, `manipulability`, √det(J Jᵀ)
+        of its velocity by rates of joints with motors (Yoshikawa, 1985); by "joints_locked/…", "joints_compliant/…":
         `frequency` (count,) Hz, `compliance` (k, k), `stiffness` (d,) and `least_stiffness` N/m, its `direction` (d,),
         `response` (F, d) m/N. Of the robot: `torque` (motors,) N·m or N, `robot` (segments, 2, 3) m.
         """

@@ -181,7 +181,10 @@ class Statics:
         return q, taken == 1.0
 
     def balance(self, q: Array, free: Indices, relief: Relief = (0.0, 0.0)) -> Balance:
-        """Forces at q (n_q,), rad and m, less `relief`, with multipliers that balance them best along v[`free`]."""
+        """Forces and constraint equations at q (n_q,), rad and m, less `relief`: what is taken off each.
+
+        Multipliers balance the forces best along v[`free`].
+        """
         at, J = self._at_rest(q)
         independent = _independent(J[:, free])
         J[np.setdiff1d(np.arange(len(J)), independent)] = 0.0
@@ -198,20 +201,20 @@ class Statics:
         return Balance(Q, Q - multipliers @ J, missed, J, multipliers, independent=independent, size=size)
 
     def stiffness(self, q: Array, at: Balance) -> Array:
-        """Exact ∂(C_vᵀ λ − Q)/∂q (n_v, n_v) in units of `Balance` at q (n_q,), rad and m, with multipliers of `at`."""
+        """Exact slopes (n_v, n_v) of constraint forces less loads by q, at q (n_q,); units and multipliers as `at`."""
         multipliers = at.multipliers / self.row_sizes * self.model.row_signs
         K = self.system.core.stiffness_at_rest(self.system.scene, self.t, q, multipliers, at.independent)
         return K * self.sizes * self.sizes[:, None]
 
     def holding_multipliers(self, q: Array) -> Array:
-        """Multipliers λ with C_vᵀ λ = Q at q (n_q,), N or N·m, by equation; the least if some are redundant."""
+        """Multipliers, N or N·m, by equation, that balance loads at q (n_q,); the least if some are redundant."""
         at, J = self._at_rest(q)
         return np.linalg.lstsq(J.T, at.Q * self.sizes, rcond=DEPENDENT)[0] / self.row_sizes
 
     def unstable_ways(self, q: Array) -> Iterator[str]:
         """Yield a warning if the equilibrium q (n_q,), rad and m, is unstable.
 
-        Then ∂(C_vᵀ λ − Q)/∂q has a negative eigenvalue in the directions that constraints leave free.
+        Then `stiffness` has a negative eigenvalue in the directions that constraints leave free.
         """
         tree = self.model.tree
         at = self.balance(q, np.arange(tree.n_v))
@@ -280,7 +283,7 @@ def _step(at: Balance, K: Array, free: Indices) -> Array:
 
 
 def static_equilibrium(model: Model, start: State) -> State:
-    """The equilibrium at t = 0 near `start`, its v with Ċ = 0. Raises `SolveError` where there is none."""
+    """The equilibrium at t = 0 near `start`, v meeting the constraints. Raises `SolveError` where there is none."""
     q = Statics(model).equilibrium(start.q)
     return State(q, rates_on_rows(model, q, start.v))
 
@@ -323,5 +326,5 @@ def static_shapes(
 
 
 def modal_sizes(bodies: Iterable[Body]) -> Array:
-    """√J (n,), m·√kg, of the modes of all bodies: deflections of about their length."""
+    """Modal coordinates (n,), m·√kg, that deflect each body by about its length."""
     return np.concatenate([np.full(body.n_modes, np.sqrt(body.largest_moment)) for body in bodies])

@@ -118,7 +118,7 @@ def frequencies_along(model: Model, begin: float, end: float, modes: int) -> Pat
 
 
 def with_robot_damping(model: Model, ratios: Mapping[str, float]) -> Model:
-    """The robot with modal damping by which vibrations of the whole robot have ζ = `ratios` (by body) if all are equal.
+    """The robot with damping of bodies in `ratios`: if all are equal, vibrations of the robot have this damping ratio.
 
     At the initial posture, motors free, gears rigid; docs/theory.md, Damping. Other bodies keep their damping.
     """

@@ -65,8 +65,8 @@ def watch_limits(scene: _core.TreeScene, tree: KinematicTree) -> None:
 def left_ranges(model: Model, ranges: Sequence[Seen] | None, times: Array, q: Array, v: Array) -> Iterator[str]:
     """Yield a warning for each coordinate outside its position_limit: the first time, and its range.
 
-    `ranges`: what the core found of each of `watched`; None where it did not integrate the motion. Others, then
-    all, are looked at in outputs at `times` (T,), s: `q` (T, n_q), `v` (T, n_v), rad, m and s.
+    `ranges`: what the core found of each of `watched`; None where it did not integrate the motion. Coordinates
+    without these are looked at in outputs at `times` (T,), s: `q` (T, n_q), `v` (T, n_v), rad, m and s.
     """
     of_core = zip(watched(model.tree), ranges, strict=True) if ranges is not None else ()
     seen = [(one.joint, one.number, one.seen(values)) for one, values in of_core]

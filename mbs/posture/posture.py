@@ -114,18 +114,18 @@ def shape_in_redundant_loops(model: Model, q: Array, rows: Indices) -> str:
 
 
 def worst_posture(model: Model, times: Array, q: Array, loop_rank: int = -1) -> tuple[float, int]:
-    """Least ratio of `Mobility` at `times` (T,), s, and q (T, n_q), and number of this time.
+    """Least `Mobility.ratio` of singular values at `times` (T,), s, and q (T, n_q), and number of this time.
 
-    `loop_rank` as in `mobilities`.
+    `loop_rank`: of loop equations with straight links; −1: that at q.
     """
     ratios = [at.ratio for at in mobilities(model, q, times, loop_rank)]
     return min(ratios), int(np.argmin(ratios))
 
 
 def describe_posture(model: Model, ratio: float, t: float, q: Array, *, is_end: bool, loop_rank: int = -1) -> str:
-    """A message on the worst posture q (n_q,) of a path at t (s) with `ratio` of `Mobility`; "" if regular.
+    """A message on the worst posture q (n_q,) of a path at t (s) with this `ratio` of singular values; "" if regular.
 
-    `is_end`: the run ends there, in a singular posture. `loop_rank` as in `mobilities`.
+    `is_end`: the run ends there. `loop_rank`: of loop equations with straight links; −1: that at q.
     """
     if not ratio < NEARLY_SINGULAR:
         return ""
@@ -138,7 +138,7 @@ def describe_posture(model: Model, ratio: float, t: float, q: Array, *, is_end: 
 def describe_branches(model: Model, times: Array, q: Array, loop_rank: int) -> str:
     """A message if loops pass a singular posture at `times` (T,), s, and q (T, n_q), rad and m; else "".
 
-    `loop_rank` as in `mobilities`.
+    `loop_rank`: of loop equations with straight links; −1: that at q.
     """
     ratios = np.array([at.loop_ratio for at in mobilities(model, q, times, loop_rank)])
     worst = int(ratios.argmin())
@@ -251,8 +251,7 @@ RESTING = 1e-6  # of the largest value, within the run: a path that moves less s
 def check_smooth(path: Path, targets: Iterable[tuple[str, TimeFunction]], end: float) -> None:
     """Raise `InputError` for one of `targets` (label, function) that jumps in value or velocity from t = 0 to `end`, s.
 
-    `path` is the scene's file. Accelerations may jump. The intervals that the trapezoidal rule on the exact
-    derivatives describes worst are halved; a jump stays.
+    `path` is the scene's file. Accelerations may jump.
     """
     for label, target in targets:
         for order, quantity in enumerate(("value", "velocity")):

@@ -55,7 +55,7 @@ def undeformed_posture(model: Model) -> State:
 
 
 def rates_on_rows(model: Model, q: Array, v: Array, locked: Booleans | None = None) -> Array:
-    """Return v (n_v,) with Ċ = 0 at q (n_q,), SI units, and t = 0 by the least change of joints not `locked` (n_v,)."""
+    """Return v (n_v,) that meets constraints at q (n_q,), SI, t = 0, by least changes of joints not `locked` (n_v,)."""
     scales, now = model.joint_sizes if locked is None else np.where(locked, 0.0, model.joint_sizes), np.zeros(1)
     (C_v,), (C_dot,) = model.constraints.values(q[None], now)[1], model.constraints.rates(q[None], v[None], now)
     sizes = model.row_sizes
@@ -225,10 +225,7 @@ def out_of_reach(model: Model, times: Array) -> str:
 
 
 def check_reach(model: Model, end: float) -> None:
-    """Raise `InputError` for a path that leads beyond the reach of the undeformed links before `end` (s).
-
-    Flexible links would stretch beyond all sense instead of failing.
-    """
+    """Raise `InputError` for a path that leads beyond the reach of the undeformed links before `end` (s)."""
     for name, how in _beyond(model, np.linspace(0.0, end, REACH_CHECKS)):
         raise InputError(f'{model.scene.path}: trajectory "{name}": expected a target within reach', f"one that {how}")
 

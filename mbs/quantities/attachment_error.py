@@ -27,7 +27,8 @@ JOLT = 0.01  # of the largest deformation: where more begins to ring at once, mo
 class Start(NamedTuple):
     """Start of a run, coordinates scaled by the robot: M (n_v, n_v), C_q (constraints, n_v), accelerations a (n_v,).
 
-    K (n_v,), D (n_v, n_v) and `late` (n_v,), 1/ω_m² − 1/ω² of `mode_error`, s², are 0 except for modal coordinates.
+    `stiffness` (n_v,), `damping` (n_v, n_v) and `late` (n_v,), s², are 0 except for modal coordinates, of which `late`
+    is the estimated error by too few modes per acceleration.
     """
 
     M: Array
@@ -43,12 +44,13 @@ class Start(NamedTuple):
 def mode_error(run: Run) -> float | None:
     """Estimated error of torques, reactions and deflections for too few modes, as a share of their peaks.
 
-    None for rigid robots, or links without attachment modes. These contain the static part of omitted eigenmodes. The
-    dynamic part is about that of a vibration at ω_m between the highest eigenmode kept, ω_k, and the lowest attachment
-    mode above it, ω_a (Rayleigh): ω_m² = ω_k ω_a. So δp = (1/ω_m² − 1/ω²) p̈, limited to the largest p where attachment
-    modes ring at their own ω, as after a jump of the acceleration. The estimate is the largest √(δpᵀ K δp) of a link
-    against the largest √(pᵀ K p). Phase errors of vibrations from the start on are in `start_errors`.
+    None for rigid robots, or links without attachment modes. Phase errors of vibrations from the start on are in
+    `start_errors`.
     """
+    # Attachment modes contain the static part of omitted eigenmodes. The dynamic part is about that of a vibration at
+    # ω_m between the highest eigenmode kept, ω_k, and the lowest attachment mode above it, ω_a (Rayleigh): ω_m² = ω_k
+    # ω_a. So δp = (1/ω_m² − 1/ω²) p̈, limited to the largest p where attachment modes ring at their own ω, as after a
+    # jump of the acceleration. The estimate is the largest √(δpᵀ K δp) of a link against the largest √(pᵀ K p).
     ratios = []
     for node in run.model.tree.nodes:
         body, p, p_ddot = node.body, _deformation(run, node), run.a[:, node.p_v]
@@ -77,16 +79,16 @@ def _late(body: Body) -> Array:
 
 
 def start_errors(start: Start) -> tuple[float, float]:
-    """Return the share of the largest √(Σ pᵀ K p) of all links that vibrates from the start on, and its phase error.
+    """Return the share of the links' largest deformation that vibrates from the start on, and its phase error.
 
-    The phase error, a share of the same, is that of too few modes. Vibrations are 0 on smooth paths from equilibrium,
-    0.1 to 1 where links start undeformed under gravity, or a path with a jump of its acceleration.
-
-    Vibration i of shape φ_i and frequency ω_i has the share z̈_i = φ_iᵀ K q̈/ω_i² of the first accelerations q̈. It begins
-    z̈_i/ω_i² away from its center; its amplitude is z̈_i/ω_i in √(2 J). With ω_m of attachment modes (`mode_error`),
-    Rayleigh's quotient lowers ω_i by δω_i/ω_i = ½ Σ_a K_a φ_ia² (1/ω_m² − 1/ω_a²). The phase is off by δω_i T at the
-    end of the run, and matters most when damping δ_i has left 1/e of it: by δω_i/(e δ_i) at most.
+    Deformation is the root of strain energy. The phase error, a share of the same, is that of too few modes. Vibrations
+    are 0 on smooth paths from equilibrium, 0.1 to 1 where links start undeformed under gravity, or a path with a jump
+    of its acceleration.
     """
+    # Vibration i of shape φ_i and frequency ω_i has the share z̈_i = φ_iᵀ K q̈/ω_i² of the first accelerations q̈. It
+    # begins z̈_i/ω_i² away from its center; its amplitude is z̈_i/ω_i in √(2 J). With ω_m of attachment modes
+    # (`mode_error`), Rayleigh's quotient lowers ω_i by δω_i/ω_i = ½ Σ_a K_a φ_ia² (1/ω_m² − 1/ω_a²). The phase is off
+    # by δω_i T at the end of the run, and matters most when damping δ_i has left 1/e of it: by δω_i/(e δ_i) at most.
     if not start.largest:
         return 0.0, 0.0
     squares, shapes = elastic_shapes(start.M, np.diag(start.stiffness), start.C_q)

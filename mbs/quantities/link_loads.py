@@ -30,7 +30,10 @@ class LinkLoads(NamedTuple):
 
 
 def loads_on_links(run: Run, bodies: Iterable[str]) -> dict[str, LinkLoads]:
-    """Return loads on `bodies`, with motors, if they suffice, in place of path forces; {} if these turn frames."""
+    """Return loads on `bodies`; {} where motors turn frames.
+
+    Motors that are as many as degrees of freedom act in place of forces on paths.
+    """
     if run.model.scene.motors == "frame":
         return {}
     model, behind = run.model, behind_gears(run)

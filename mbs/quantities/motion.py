@@ -132,7 +132,7 @@ def places(run: Run) -> Places:
 
 @kept
 def system_of(run: Run) -> MultibodySystem:
-    """The equations of motion of a run, with drives without force on payloads' points, whose motion is then known."""
+    """The equations of motion of a run; drives without force at payloads make the motion of these points known."""
     scene = run.model.scene
     payloads = (PointDrive(load.point, {}) for load in scene.payload if not turns_as_a_body(scene, load))
     return MultibodySystem(run.model, Drives(at_points=(*run.applied, *payloads)))
@@ -146,7 +146,7 @@ def acting_forces(run: Run) -> MotionForces:
 
 @kept
 def constraint_rows(run: Run) -> tuple[Array, Array]:
-    """Return C (T, m), m or rad, of m constraint equations, and C_v (T, m, n_v)."""
+    """Return C (T, m), m or rad, of m constraint equations, and Jacobians C_v (T, m, n_v)."""
     return run.model.constraints.values(run.q, run.time)
 
 

@@ -36,8 +36,7 @@ def followed_trajectories(run: Run) -> list[Trajectory]:
 def actuator_forces(run: Run) -> MotorForces | None:
     """Return required forces of motors, through compliant gears, and on modes.
 
-    None if nothing is prescribed, or not `motors_fit` in the plane. Modal forces of links in pieces follow from
-    those on their pieces by virtual work.
+    None if nothing is prescribed, or in the plane if motors are not as many as degrees of freedom.
     """
     supplied = _supplied(run)
     if supplied is None:

@@ -118,7 +118,7 @@ class Missing(NamedTuple):
     of_deflections: float
 
     def grown_to(self, worst: "Missing") -> "Missing":
-        """Return errors scaled to the `worst` link's error of deflections, that of points up to the worst one's."""
+        """Return errors raised in proportion to those of the `worst` link, `of_length` at most to its own."""
         if not 0.0 < self.of_deflections < worst.of_deflections:
             return self
         in_proportion = self.of_length / self.of_deflections * worst.of_deflections
@@ -197,7 +197,7 @@ def _largest(p: Array, shapes: Array) -> float:
 def largest_lengths(p: Array, shapes: Array) -> Array:
     """Return the largest |shape · p| (T,), m or rad, of k `shapes` (k, axes, n) at p (T, n), √kg·m.
 
-    One shape after the other: all at once do not fit into memory in long runs.
+    One after the other: all at once may not fit into memory.
     """
     squares = np.zeros(len(p))
     for shape in shapes:

@@ -39,17 +39,17 @@ class PatchedLink(Protocol):
 
     @property
     def to_reached(self) -> Mapping[str, Array]:
-        """Matrices (m, n), by body, from forces on the n modes of the file to the m modal forces of `allocation`."""
+        """Matrices (m, n), by body, from forces on n modes of the file to those on m modes that patches reach."""
 
     def allocation(self, *, limited: bool) -> _core.Allocation:
-        """Return the map from modal forces to voltages, with limits of the patches or without."""
+        """Return the map from m modal forces to k voltages, with limits of the patches or without."""
 
 
 class PointsOfBody(Protocol):
     """Points of one body for c components of force along its axes."""
 
     def of_core(self) -> tuple[Array, Array, Array, Array]:
-        """Return arrays for `_core.point_reader`: directions and positions (3, c), Φ (3 c, n), scale (6 + n)."""
+        """Return directions (3, c), positions (3, c), m, mode shapes (3 c, n), 1/√kg, factors to N (6 + n,)."""
 
 
 ForcesAtPoints = Callable[[Run], Mapping[str, Array]]

@@ -448,12 +448,10 @@ def _loads(system: MultibodySystem) -> Iterator[tuple[str, TimeFunction]]:
 
 
 def load_jump(loads: Iterable[tuple[str, TimeFunction]], t: float) -> str:
-    """Return which labelled load jumps at t (s), or has no finite value from there on; else "".
-
-    Values alone are compared, as functions of Python may have no derivatives: changes just before, at and after t.
-    """
+    """Return which labelled load jumps at t (s), or has no finite value from there on; else ""."""
     dt = 1e-9 * max(t, 1e-9)
     for label, size in loads:
+        # Values alone: functions of Python may have no derivatives
         values = [size(t + k * dt) for k in (-3, -1, 1, 3)]
         if not (np.isfinite(values[2]) | ~np.isfinite(values[1])).all():
             return f"{label} has no finite value, slope or curvature after that time"

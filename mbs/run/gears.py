@@ -106,8 +106,8 @@ class MotorCoordinates(NamedTuple):
 
     Attributes:
         q, v, a: (T, n_q), (T, n_v), (T, n_v), SI units.
-        gears: by joint, where the run has them rigid; {} where they are compliant in the run, too.
-        moments: (T, k) N·m or N, by joint, of all motors, in the same case.
+        gears: by joint; {} where they are compliant in the run, too.
+        moments: (T, k) N·m or N, by joint, of all motors; {} likewise.
     """
 
     q: Array

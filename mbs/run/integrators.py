@@ -27,7 +27,7 @@ METHODS = {name: getattr(_core.MethodKind, name.replace("-", "_")) for name in N
 class Rule(NamedTuple):
     """Size and cost of steps of DOP853 and Radau IIA, measured in runs of tests/campaigns/choice.py.
 
-    DOPRI5 is never faster by more than clocks scatter: undamped, its steps have to be five times as short as those of
+    DOPRI5 is never notably faster: undamped, its steps have to be five times as short as those of
     DOP853 (it is stable up to 1.0), damped nearly three.
     """
 
@@ -116,7 +116,8 @@ NOT_INTEGRATED = Choice("none", "nothing to integrate")
 def without_choosing(frequency: float, duration: float, replay: float, cost: float) -> Choice | None:
     """DOP853 for a run so short that choosing takes a notable part of it; None for others.
 
-    `frequency` rad/s, about the highest; `duration` s; `cost` of a Radau step, and `replay`: see `Rule.cost_of_radau`.
+    `frequency` rad/s, about the highest; `duration` s; `cost` of a Radau step in those of DOP853;
+    `replay`: time to find replayed inputs, in evaluations.
     """
     steps = max(duration * frequency / RULE.stable, 1.0)
     if steps * RULE.of_dop853 * (1.0 + replay) > RULE.short:

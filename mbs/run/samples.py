@@ -87,7 +87,7 @@ def telling(times: Array, values: Array, sizes: Array) -> Indices:
 
 
 def about_highest(some: Indices, quantities: Array, beside: int = 1) -> Indices:
-    """Numbers of all samples about the highest local maxima of each of `quantities` (T, columns).
+    """Numbers of all samples about the `LOOKS.highest` largest local maxima of each of `quantities` (T, columns).
 
     Quantities are known at the samples with numbers `some` (T,). Samples from `beside` of these before a maximum to as
     many after it count.
@@ -107,7 +107,7 @@ def _highest(values: Array) -> list[int]:
 def in_order(outputs: Array, samples: Array) -> Indices:
     """Numbers in (outputs (T,), samples (k,)), each ascending times in s, that put both in the order of time.
 
-    Of times that are equal to round-off only the output counts: steps may end there at samples of a controller.
+    Of times that are equal to round-off only the output counts.
     """
     times, after = np.concatenate([outputs, samples]), np.searchsorted(outputs, samples)
     padded = np.concatenate([[-np.inf], outputs, [np.inf]])

@@ -44,8 +44,8 @@ def stops(
 ) -> Array:
     """Return times (n,), s, at which integration steps must end in a run with outputs at `times` (T,), s.
 
-    Steps look at paths and loads at their stages alone, and might pass a pulse. So they end where a condition such as
-    t < 0.1 changes in paths and loads, and in brief pieces in which a path moves far or conditions change.
+    Steps end where a condition such as t < 0.1 changes in paths and loads, and in brief pieces in which a path moves
+    far or conditions change.
     `is_driven`: paths alone move the robot; steps also end where its forces have to be looked at. `is_replay`: forces
     follow from other paths; steps also end where these bend.
     """

@@ -70,10 +70,10 @@ class Posed:
 
 
 def bounds_of_zeros(asked: Transition, linear: Linearisation, around: tuple[float, float]) -> Bounds:
-    """Least voltages that each zero needs, V, shared as `asked.units`; `around`: pre- and post-actuation, s.
+    """Least voltages that each zero needs, V, if all patches have equal shares of their limits.
 
-    By docs/theory.md, (44): of zeros in the right half plane for rest at the start, of the others for rest at the end.
-    Vibrations (`LIGHT`) are left out. Raises `SolveError` where motors alone have no bounded motion.
+    `around`: pre- and post-actuation, s. By docs/theory.md, (44): zeros in the right half plane count for rest at the
+    start, others at the end, vibrations never. Raises `SolveError` where motors alone have no bounded motion.
     """
     servo, end, unit = asked.driven, float(linear.times[-1]), asked.units
     pre, post = map(max, decay_times(linear, needs_future=True), around)
@@ -103,8 +103,7 @@ def bounds_of_zeros(asked: Transition, linear: Linearisation, around: tuple[floa
 def _remedies(posed: Posed, intervals: int, share: float) -> Iterator[str]:
     """What would bring a least voltage of `share` times the limits within them, each by a few solutions.
 
-    It falls as in `check_reach`, s the slowest zero to the right (Zou and Devasia, 1999), m the order of the path's
-    start.
+    It falls as after (44) in docs/theory.md, s the slowest zero to the right, m the order of the path's start.
     """
     asked, (pre, post), zeros = posed.asked, posed.around, posed.linear.zeros.real
     servo, end, given = asked.driven, asked.driven.end, asked.tolerance or Tolerance(0.0)
@@ -155,10 +154,9 @@ def _enough(share_with: Callable[[float], float], share: float, rate: float) -> 
 
 
 def check_reach(posed: Posed, least: Tracked | None) -> None:
-    """Raise `SolveError` where a zero, or the least voltage, surely needs `OUT_OF_REACH` times the limits.
+    """Raise `SolveError`, with remedies, where patches surely need `OUT_OF_REACH` times their limits.
 
-    Its advice is by the bound of the zero s: ∝ e^{−s t} of the time t around the path, ∝ T^−m of the path's time T, and
-    linear in a path tolerance.
+    By the voltages that zeros of the robot require, and that of `least`, the motion of least voltage.
     """
     asked, bounds, limit = posed.asked, posed.bounds, posed.asked.units.max()
     share = 0.0 if least is None else least.surely
@@ -213,7 +211,7 @@ def check_motors(posed: Posed) -> None:
 
 
 def check_found(context: Context, posed: Posed, least: Tracked) -> None:
-    """Raise `SolveError` where there is no least voltage: amplifiers are too slow, or the path is too fast."""
+    """Raise `SolveError` if `least`, of least voltage, was not found: amplifiers too slow, or the path too fast."""
     if least.converged:
         return
     asked, limits, place = posed.asked, posed.asked.limits, posed.asked.driven.where
@@ -249,19 +247,19 @@ def causes(context: Context, posed: Posed) -> str:
 
 
 def is_beyond(posed: Posed, least: Tracked) -> bool:
-    """Whether the least voltage is beyond the limits of patches."""
+    """Whether the motion of least voltage is beyond the limits of patches."""
     return least.share > 1.0 + ENOUGH and posed.asked.is_limited
 
 
 def needs_none(posed: Posed, least: Tracked) -> bool:
-    """Whether motors alone stay within the path tolerance, so that no voltage is needed."""
+    """Whether motors alone stay within the path tolerance: the motion of least voltage has none."""
     return posed.asked.tolerance is not None and least.share < NONE
 
 
 def warnings_of(context: Context, posed: Posed, intervals: int, least: Tracked) -> Iterator[str]:
     """Yield warnings: limits too small, with remedies; ends of the path and places of patches that cost voltage.
 
-    `intervals`: number with which the analysis begins.
+    `intervals`: number with which the analysis begins; `least`: the motion of least voltage.
     """
     servo, limits = posed.asked.driven, np.unique(np.abs(posed.asked.limits.patches.range))
     if is_beyond(posed, least):
@@ -283,7 +281,7 @@ def warnings_of(context: Context, posed: Posed, intervals: int, least: Tracked) 
 
 
 def price_of_tolerance(asked: Transition, least: Tracked) -> float | None:
-    """Decrease of the least voltage per path tolerance, V/m; None without one, or if it is too small."""
+    """Decrease of the least voltage, that of `least`, per path tolerance, V/m; None without one, or if too small."""
     if asked.tolerance is None:
         return None
     prices = float(least.prices["error"].sum() + least.prices["curving"].sum() / asked.tolerance.time**2)

@@ -46,8 +46,8 @@ def within_limits(
 ) -> Tracked:
     """The motion `asked` for with compliant gears, within `limits`, or else the motion that exceeds these least.
 
-    Limits of the problem are reduced by excesses between Gauss points. `meshes` (breaks, s): the second is coarser, for
-    cases without solution on the first; `tolerance`: relative residual force on modes; `step` (s) of outputs.
+    `meshes` (breaks, s): the second is coarser, for cases without solution on the first; `near`: a first guess;
+    `tolerance`: relative residual force on modes; `step` (s) of outputs.
     """
     near, wanted = _without_jumps(asked, meshes, near, tolerance), replace(asked, limits=limits)
     found, power, now = list[tuple[float, Tracked]](), SHRUNK[1], asked
@@ -136,8 +136,7 @@ def behind_gears(asked: Transition, tracked: Tracked, step: float) -> Tracked:
 def smooth(asked: Transition, tracked: Tracked) -> Tracked:
     """The motion with p as a quintic spline at rest at both ends, and voltages for least residual forces on modes.
 
-    Its third derivative is zero at the ends, in place of conditions at the breaks next to them: else δ̈ would jump, and
-    with it the reaction on a link with a gear of its own, whose motor would need an impulse.
+    Its third derivative is zero at the ends: else δ̈ would jump, and a motor might need an impulse.
     """
     breaks = tracked.voltage.x
     still = [(order, np.zeros(len(asked.Phi_V))) for order in (1, 2, 3)]
@@ -156,7 +155,7 @@ def smooth(asked: Transition, tracked: Tracked) -> Tracked:
 class Shares(NamedTuple):
     """Largest shares of limits in a motion, with the times `peak_times` (motors,), s, of the largest torques."""
 
-    voltage: float  # of sizes where patches have no limits
+    voltage: float  # of `Weights.voltage` where patches have no limits
     torques: Array  # (motors,), 0 of motors without a limit
     peak_times: Array
 

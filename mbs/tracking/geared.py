@@ -27,7 +27,7 @@ SAME = 1e-8  # of the largest torque of its motor, these two
 
 @struct
 class Gears:
-    """Compliant gears (k,): numbers `columns` among motor torques, K (N·m/rad), D (N·m·s/rad), I = J N² (kg·m²)."""
+    """Compliant gears (k,): numbers `columns` of motors, K (N·m/rad), D (N·m·s/rad), I of rotors at joints (kg·m²)."""
 
     joints: tuple[str, ...]
     columns: Indices
@@ -48,7 +48,10 @@ class GearedServo(Servo):
     without: tuple[Servo, ...]
 
     def forces(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array]:
-        """Residual modal forces r (N, n), N/√kg, and torques (N, motors + k), N·m or N."""
+        """Residual modal forces r (N, n), N/√kg, and torques (N, motors + k), N·m or N.
+
+        At `times` (N,), s, with p, ṗ = v, p̈ = a (N, n), m·√kg and s.
+        """
         r, tau = super().forces(times, p, v, a)
         of_gears = [
             servo.motion.motion(times.tolist(), p, v, a, self.postures(times)).tau[:, [column]]
@@ -57,7 +60,7 @@ class GearedServo(Servo):
         return r, np.hstack([tau, *of_gears])
 
     def slopes(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
-        """Derivatives (N, n + motors + k, n), SI units, of (r, τ) of `forces` by p̈, ṗ and p."""
+        """Derivatives (N, n + motors + k, n), SI units, of residual modal forces and torques by p̈, ṗ and p."""
         found = [super().slopes(times, p, v, a)]
         for servo, column in zip(self.without, p.shape[1] + self.gears.columns, strict=True):
             M, D, K = servo.slopes(times, p, v, a)

@@ -42,8 +42,7 @@ def track(
     """Solve on `breaks` (N + 1,), s, from a motion `near`, or from quasi-static links and no voltages.
 
     Newton's method ends with a step smaller than the share `within` of the peaks.
-    With `calm`, this share of the effort is added to the least share of limits, which is found within `WHILE_SETTLING`.
-    For voltages it grows to one away from the ends: else residual forces remain between Gauss points (theory.md).
+    With `calm`, this share of the effort joins the objective, for voltages more of it away from the ends (theory.md).
     """
     if asked.tolerance is not None and near is None:  # exact tracking is a good start
         exact = track(replace(asked, tolerance=None), breaks, None, calm, within)
@@ -125,7 +124,8 @@ def start_breaks(start: float, path_end: float, end: float, intervals: int) -> A
 def refined(asked: Transition, breaks: Array, tolerance: float, near: Tracked) -> Tracked:
     """The solution on `breaks` (N + 1,), s, divided until residual forces are below `tolerance`.
 
-    `tolerance` is a share of the largest elastic force; at probes, torques exceed their limits by half of it at most.
+    `tolerance` is a share of the largest elastic force; torques between Gauss points exceed their limits by half of it
+    at most. `near`: a motion to start from.
     """
     tracked, within = near, tolerance**0.5  # Newton's next step is about the square of the last one
     while True:
@@ -155,9 +155,9 @@ def _left_over(asked: Transition, tracked: Tracked, tolerance: float) -> tuple[f
 def settled(asked: Transition, breaks: Array, to: float = SETTLED) -> Tracked:
     """The least voltage, on intervals that are halved where V or ë turns until it changes by at most the share `to`.
 
-    V and ë are linear on each interval: on finer ones the least share falls. Where steps wander, more of the effort
-    joins it, on intervals that are all halved. The least of all solutions that converge is taken; one with much force
-    `LOST` between Gauss points did not converge. Far beyond the limits nothing is refined.
+    Where steps wander, more of the effort joins the objective, on intervals that are all halved. The least of all
+    solutions that converge is taken; one with much force `LOST` between Gauss points did not converge. Far beyond the
+    limits nothing is refined.
     """
     best, is_settled = _descend(asked, breaks, CALM[0], to)
     for calm in CALM[1:]:

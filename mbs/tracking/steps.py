@@ -98,7 +98,7 @@ class Iterate:
     moved: float = np.inf
 
     def tracked(self, steps: "Steps") -> Tracked:
-        """Return the motion as piecewise polynomials, with cost and prices by the last program of `steps`."""
+        """Return the motion as piecewise polynomials, with effort and its decrease per unit of limits by `steps`."""
         assert self.found is not None
         breaks, steps.sigma = steps.breaks, self.share
         cost = steps.cost(self.found)
@@ -132,7 +132,7 @@ class Steps:
     program: Program
     tolerance, gap = TOLERANCE, GAP
     effort: tuple[Array, Array, float]  # H, g, and the constant that the program leaves out
-    unique, damping = UNIQUE, 0.0
+    unique, damping = UNIQUE, 0.0  # shares of the effort, and of sizes of steps, in the objective
     of_voltages: float | Array = 1.0  # (N,) times the share of the effort
     rows: list[tuple[str, Array, Indices]]  # of inequalities: their kind, limits (i,), and whose they are (i,)
 

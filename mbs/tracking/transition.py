@@ -123,27 +123,27 @@ class Transition:
 
 @struct
 class Tracked:
-    """Solution of a `Transition`: p(t), m·√kg, and V(t), V, as piecewise polynomials, and how they were found."""
+    """Solution of a `Transition`: `curve` p(t) (n,), m·√kg, `voltage` V(t) (m,), V, and how they were found."""
 
     curve: PPoly
     voltage: PPoly
     converged: bool
     iterations: int
-    share: float  # σ, the least share of limits (`objective` "least-…"), or of V_ref or τ_ref where there are none
-    cost: float  # J; 0 where it is not the objective
-    # decrease of J, or σ, per unit of limits, 0 of others: "voltage", "slew", "current" (m,), 1/V, s/V, 1/A, "torque"
-    # (motors,), 1/(N·m) or 1/N, of points "error" and "curving", 1/m, s²/m
+    share: float  # least share of limits (`objective` "least-…"), or of `Transition.weights` where none is set
+    cost: float  # the effort, without unit; 0 where it is not the objective
+    # decrease of effort or share per unit of limits, 0 of others: "voltage", "slew", "current" (m,), 1/V, s/V, 1/A,
+    # "torque" (motors,), 1/(N·m) or 1/N, of points "error" and "curving" (its acceleration), 1/m, s²/m
     prices: dict[str, Array]
     objective: Objective
     # largest residual modal force between Gauss points, relative to the largest elastic one
     unmet: float = np.nan
-    # step, found: the last Newton step, relative, and its minimum; the next step is about the square of it
+    # step, found: the last Newton step relative to peaks, and its minimum
     step: float = np.inf
     found: Minimum | None = None
-    added: float = 0.0  # what the effort adds to the objective "least-…"
+    added: float = 0.0  # part of the objective "least-…" that is effort
     gears: Mapping[str, GearCurve] = field(default_factory=dict)  # compliant ones, by joint
     error: PPoly | None = None  # e(t), m, of points that may leave their path
-    # of the share, relative: twice its change by the last finer intervals, and what the effort may add
+    # relative uncertainty of the share: twice its change by the last finer intervals, and what the effort may add
     doubt: float = np.inf
 
     @property
@@ -153,7 +153,7 @@ class Tracked:
 
 
 def displaced_at(servo: Servo, times: Array, off: Array) -> Servo:
-    """The robot with coordinates of points off their paths by e, ė, ë: `off` (3, T, k), SI, only at `times` (T,), s."""
+    """The robot with k `rows_of_points` off their paths by e, ė, ë: `off` (3, T, k), SI, only at `times` (T,), s."""
     times, first = np.unique(times, return_index=True)
     breaks, off = np.append(times, times[-1] + 1.0), off[:, first]
 
@@ -165,16 +165,16 @@ def displaced_at(servo: Servo, times: Array, off: Array) -> Servo:
 
 
 def displaced_along(servo: Servo, error: PPoly) -> Servo:
-    """The robot with k coordinates of points off their paths by `error`(t) (k,), m, as quintic Hermite pieces."""
+    """The robot with the k coordinates of `rows_of_points` off their paths by `error`(t) (k,), m, in quintic pieces."""
     times = np.union1d(error.x, np.linspace(error.x[0], error.x[-1], PIECES + 1))
     off = np.array([error(times, order) for order in range(3)])
     return _with_targets(servo, lambda target, k: through(times, target.sample(times) + off[:, :, k]))
 
 
 def forces_off_path(servo: Servo, times: Array, motion: Sequence[Array], off: Array) -> tuple[Array, Array]:
-    """(r, τ) (T, n + torques) with e, ė, ë = `off` (3, T, k) at `times` (T,), s, and slopes (3, T, n + torques, k).
+    """Residual modal forces and torques (T, n + torques) at `times` (T,), s, and slopes (3, T, n + torques, k).
 
-    `motion`: p, ṗ, p̈ (T, n); SI units. Differences are exact for ë, and for e and ė to about `NEAR`.
+    `off` (3, T, k): path errors e, ė, ë; `motion`: p, ṗ, p̈ (T, n); SI units. Slopes are by `off`, exact for ë.
     """
     now = np.hstack(displaced_at(servo, times, off).forces(times, *motion))
     slopes, size = np.zeros((3, *now.shape, off.shape[2])), NEAR * servo.model.size
