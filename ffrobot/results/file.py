@@ -382,7 +382,7 @@ class Results:
     def settling(self, point: str, option: str = "settling") -> tuple[str, Mapping[str, Any]]:
         """First analysis with residual vibration of "BODY.POINT" (or of "ANALYSIS/BODY.POINT"), and its attributes.
 
-        Raises `InputError`, with the `option` that names the point, where there is none.
+        Raises `InputError` where there is none; the message begins with `option`, which named the point.
         """
         analysis, slash, name = point.rpartition("/")
         groups = [analysis] if slash else list(self._file)

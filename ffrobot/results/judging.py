@@ -66,7 +66,7 @@ def tool_error(group: h5py.Group, scene: Scene, *, feasible: bool | None) -> Too
 def off_path(group: h5py.Group, scene: Scene) -> Iterator[tuple[str, float, float]]:
     """Yield each point of a replay with its largest and RMS distance (m) from its prescribed path.
 
-    Over their common time and along the axes that the path prescribes; for old files at common outputs.
+    Over the time of both and along the axes that the path prescribes; for old files at outputs of both.
     """
     if "off_path" in group:
         for one in group["off_path"].values():

@@ -39,7 +39,8 @@ LISTED = 3  # natural frequencies
 def write_linear(group: h5py.Group, run: Run, linear: LinearModels) -> None:
     """Write linear/ of an analysis, and its joint conditions.
 
-    Models (T, …), poles, frequencies, shapes of all bodies, controllability; zeros (T, most, 2), 1/s, padded by nan.
+    Models (T, …), poles, frequencies, shapes of all bodies, controllability. Zeros (T, zeros, 2), 1/s, are real and
+    imaginary parts, NaN where an instant has fewer.
     """
     n_v, models = run.model.tree.n_v, linear.models
     write_joint_conditions(group, run, linear)
@@ -154,7 +155,8 @@ def write_placement(group: h5py.Group, _: Run, placed: Placed) -> None:
 def write_tracking(group: h5py.Group, run: Run, tracked: TrackedPath) -> None:
     """Write tracking/ of an analysis: errors and effort.
 
-    Also work (J) and largest power (W) of motors and of patches, least voltage for each zero (V), prices of limits.
+    Also work (J) and largest power (W) of motors and of patches, least voltage for each zero (V), decrease of the
+    objective per unit of each limit.
     """
     group = group.create_group("tracking")
     about = group.attrs

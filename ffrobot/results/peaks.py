@@ -29,7 +29,7 @@ MEAN_POWER, RMS_POWER = "mean_power", "rms_power"
 def peaking(result: AnalysisResult) -> Iterator[tuple[str, Array]]:
     """Name and values (T, …) of each history of an analysis that has peaks, at all times of `result.histories`.
 
-    In SI units and along the axes of the scene. If `result.wants` parts only: these, and some that cost nothing.
+    In SI units and along the axes of the scene. If `result.wants` only some: these, and others that cost nothing.
     """
     of, wants = result.histories, result.wants
     run, space = of.run, of.run.space

@@ -184,7 +184,7 @@ def resume_scene(scene: Scene | Path, results: Path, watcher: Watcher, keep: Kee
     """Run `solve_scene` from where the file `results` ends; None if that is complete. From the start if absent.
 
     Raises `InputError` where the file is not that of the same scene, modal bodies and waypoints; else as
-    `solve_scene`.
+    `solve_scene`. `keep` is called with the solution, also before an error is raised.
     """
     solution = prepare_scene(scene, watcher)
     if not results.exists():

@@ -36,7 +36,8 @@ class LoadedBody:
         carrying: the same with these payloads at small rotations: its modes are those of the loaded link.
         structure: change of mass and stiffness by patches; None without any.
         modal, path: its modal body and the file of that, None where it is rigid.
-        computed, reused: whether stage 1 ran for it; "modes" or "mesh" if of an earlier run.
+        computed: whether stage 1 ran for it.
+        reused: "modes" or "mesh" that it took from an earlier run, or empty.
         motions: families of motion (bending, torsion, axial) that the scene can require of a link.
     """
 

@@ -59,7 +59,8 @@ class Search:
 def fastest(scene: Scene, judge: Judge) -> tuple[Scene, str]:
     """The scene with its paths stretched by the least factor (to 0.5 %) that keeps all limits, and a note on it.
 
-    Raises `InputError` where nothing has a limit, no analysis can judge, or the run is too short for any such motion.
+    `judge` returns the feasibility of a scene. Raises `InputError` where nothing has a limit, no analysis can judge, or
+    the run is too short for any such motion.
     """
     search = Search(scene, judging(scene), judge)
     least, most = _bounds(scene, search.analysis)
@@ -85,10 +86,7 @@ def fastest(scene: Scene, judge: Judge) -> tuple[Scene, str]:
 
 
 def least_stretch(keeps_limits: Callable[[float], bool], least: float, most: float) -> float | None:
-    """The least factor of times in [least, most] with which `keeps_limits`, to 0.5 %, or None.
-
-    From 1 on by factors until it lies between two, then by bisection of their ratio.
-    """
+    """The least factor of times in [least, most] with which `keeps_limits`, to 0.5 %, or None."""
     stretch, good, bad = min(max(1.0, least), most), 0.0, 0.0
     while not (good and bad):
         if keeps_limits(stretch):
@@ -156,8 +154,8 @@ def _names(scene: Scene) -> str:
 def with_paths(scene: Scene, model: Model, judge: Judge, stage: Callable[[str], None]) -> tuple[Scene, tuple[str, ...]]:
     """Return the scene with shapers for its frequencies and paths stretched to be `fastest`, and remarks.
 
-    Shapers are for the frequencies of `model`. `stage` is called with the name of each step. Raises `InputError` where
-    there are no such frequencies, or no motion keeps the limits.
+    Shapers are for the frequencies of `model`. `judge` returns the feasibility of a scene. `stage` is called with the
+    name of each step. Raises `InputError` where there are no such frequencies, or no motion keeps the limits.
     """
     tables = [(one, one.waypoints) for one in scene.trajectory if one.waypoints is not None]
     notes = list(dict.fromkeys(remark for _, table in tables for remark in table.remarks))

@@ -97,10 +97,10 @@ def mode_levels(scene: Scene, bodies: Mapping[str, LoadedBody]) -> list[dict[str
 
 @dataclass
 class ErrorEstimate:
-    """Relative errors of the last of several solves with more and more modes, from the differences of the last three.
+    """Relative `errors` of the `last` of several solves with more and more modes, by analysis and kind of quantity.
 
-    Where differences shrink by a ratio ρ, the last solve is off by ρ/(1 − ρ) times the last difference. The largest
-    ratio of any kind counts for all kinds of an analysis, and more than the difference is never assumed.
+    Where `differences` of two solves shrink by a `ratio` ρ, the last is off by ρ/(1 − ρ) times the last difference. The
+    largest ratio of any kind counts for all kinds of an analysis. No error exceeds the difference.
     """
 
     last: Mapping[str, Reported] = field(default_factory=dict)

@@ -51,7 +51,7 @@ def links_in_pieces(prepared: Prepared) -> dict[str, LinkInPieces]:
 def wanted_pieces(prepared: Prepared, runs: Sequence[Run]) -> dict[str, int]:
     """Return the number of pieces for bodies with `pieces = "auto"` after a solve; {} if they have enough.
 
-    The shortening of a piece falls with the square of their number. A run that failed bends links too far.
+    A run that failed bends links too far.
     """
     wanted, now, links = {}, {}, prepared.solved_links
     for body in prepared.scene.body:
@@ -69,7 +69,7 @@ def wanted_pieces(prepared: Prepared, runs: Sequence[Run]) -> dict[str, int]:
 def bending_of_links(prepared: Prepared, run: Run) -> dict[str, Bending]:
     """Largest deflections in a run by flexible body; of links in pieces, those of the worst piece.
 
-    In motion every link has the largest errors of any: errors of one link move and load all others.
+    In motion every link has the largest errors of any: links move each other.
     """
     divided = prepared.divided
     link_of = {piece: name for name, body in divided.items() for piece in body.names}

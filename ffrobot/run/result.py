@@ -73,11 +73,11 @@ class FinerCheck:
 
 @struct
 class Histories:
-    """Quantities with peaks, at outputs of an analysis and at times between them.
+    """Reactions, stresses and actuation at outputs of an analysis, and at times between them that show peaks.
 
     Attributes:
         prepared: the scene.
-        run: at these times.
+        run: the motion at all these times.
         outputs: (T,) numbers of the times that are outputs.
     """
 
@@ -201,7 +201,7 @@ class AnalysisResult:
     def predicted_shift(self) -> Mapping[str, Array]:
         """Estimated shift (T, 3), m, of each point by modal forces that no actuator supplies.
 
-        {} without such forces, or where joints have other places in the tree of pieces.
+        {} without such forces, or where division into pieces moves joints to other places in the tree.
         """
         run, of = self.run, self.histories
         asked, forces = of.actuation, actuator_forces(of.run)

@@ -54,7 +54,10 @@ def solve_scene(
 
 
 def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None) -> Solution:
-    """Run the analyses of a prepared solution, from `solution.earlier` on where present; `keep` as in `solve_scene`."""
+    """Run the analyses of a prepared solution, from `solution.earlier` on where present.
+
+    `keep` is called with the new solution, also before an error is raised.
+    """
     scene, model = solution.scene, solution.model
     check_turning(model)
     checked = [analysis.name for analysis in scene.analysis if analysis.is_checked]

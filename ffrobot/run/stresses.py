@@ -35,9 +35,8 @@ def find_stresses(
 ) -> dict[str, BodyStress]:
     """Compute stresses (Pa) of a run by body; those of links in pieces from their pieces, which are among `bodies`.
 
-    By mode acceleration where files and loads allow it, else by mode displacement: for links with forces elsewhere than
-    at interfaces, for those that patches stiffen otherwise than in bending in the plane, and for pieces of these, as
-    static stresses of files are those of the bare link.
+    By mode acceleration where files and loads allow it. By mode displacement for links with forces elsewhere than at
+    interfaces, and for those, and their pieces, that patches stiffen otherwise than in bending in the plane.
     """
     links = {name: link for name, link in links_of(bodies).items() if link.stress or link.surface_stress is not None}
     stiff = {name: of for name, of in patches.items() if any(one.layout.adds_stiffness for one in of.arrays.values())}

@@ -32,7 +32,7 @@ class Watcher:
 class Interruption:
     """Within its context the first Ctrl-C (or SIGTERM) only sets `requested`; the next one interrupts as usual.
 
-    Else `KeyboardInterrupt` would come anywhere, in calls from the core too, and lose the outputs so far. With
+    Else `KeyboardInterrupt` would come anywhere and lose the outputs so far. With
     `at_once`, of analyses without outputs yet, the first signal interrupts, too; `keeps`: analyses before have results.
     Signals reach the main thread only: in others the context does nothing.
     """
