@@ -88,7 +88,7 @@ def end_with_parent() -> None:
 
 
 def end_process(code: int) -> NoReturn:
-    """Exit with `code` without freeing memory, which takes Python a twentieth of a short command's time."""
+    """Exit with `code` without freeing memory, which takes a twentieth of a short command's time."""
     atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):

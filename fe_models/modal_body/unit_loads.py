@@ -32,7 +32,7 @@ def unit_load_names(interfaces: Iterable[str]) -> list[str]:
 
 
 def loads_at(names: Sequence[str], interface: str) -> slice:
-    """Place among the unit loads `names` of those at an interface: three forces, then three moments."""
+    """Where `names`, all unit loads, have those at an interface: three forces, then three moments."""
     first = names.index(f"force/{interface}/x")
     return slice(first, first + 6)
 

@@ -84,7 +84,7 @@ Swept = tuple[ReferenceRun, list[Point]]
 
 
 class Campaign:
-    """Measurements of `ffrobot bench`, written below `folder` and printed to `console`."""
+    """Measurements, written below `folder` and printed to `console`; `columns`: printed ones, by part."""
 
     columns = COLUMNS
 

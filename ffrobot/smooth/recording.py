@@ -51,7 +51,7 @@ class Recording:
 
     @property
     def step(self) -> float:
-        """The usual time (s) between rows."""
+        """Median time (s) between rows."""
         return float(np.median(np.diff(self.times)))
 
     def dense(self, step: float) -> tuple[Array, Array]:

@@ -165,7 +165,7 @@ class Servo:
     def motors(self, times: Array, command: Array) -> Piecewise:
         """Paths of n motors from rest by set points (T, n), rad or m, at `times` (T,), s, then for `settled` s or more.
 
-        The responses to straight lines between set points are exact.
+        Responses to lines between set points are exact.
         """
         delays = np.array([axis.delay for axis in self.axes])
         if delays.any():
@@ -203,7 +203,7 @@ class Servo:
 
     @property
     def is_invertible(self) -> bool:
-        """Whether `margins` are short; near the imaginary axis responses at zeros of G(s) decay slowly or never."""
+        """Whether `margins` are short; near the imaginary axis responses at controller zeros never decay, or slowly."""
         return max(self.margins) <= LASTING
 
     def command(self, step: float, position: Array, rate: Array) -> Array:
