@@ -159,7 +159,7 @@ BEYOND = "no smaller excess was found near this one: --starts searches from othe
 class Local:
     """One local search: first and best design, conditions of optimality at the best, and a message if it ended early.
 
-    `spent`: whether it ended because no more runs were allowed.
+    `spent`: whether it ended because no more runs were allowed. `optimality` is None if unknown.
     """
 
     start: Evaluated

@@ -156,7 +156,7 @@ TOLERANCE_REPEATED = 1e-7  # of runs with reused steps, whose noise does not dep
 def find_sensitivity(
     runs: Runs, of: Sequence[str], to: Sequence[str], step: float, tolerance: float | None
 ) -> Sensitivity:
-    """Compute derivatives of responses; arguments as of `ffrobot.sensitivity`."""
+    """Return derivatives of responses `of` by keys `to`; arguments as of `ffrobot.sensitivity`."""
     responses = tuple(parse_response(text) for text in dict.fromkeys(of))
     keys = tuple(parse_key(text, "--to") for text in dict.fromkeys(to))
     if not responses or not keys:

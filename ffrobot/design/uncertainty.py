@@ -35,7 +35,7 @@ FEWEST = 8  # samples for a quantile of 5 %
 def find_uncertainty(
     runs: Runs, of: Sequence[str], spread: Sequence[str], samples: int, seed: int, by: LinearOrSampled, *, indices: bool
 ) -> Uncertainty:
-    """Propagate distributions of keys; arguments as of `ffrobot.uncertainty`."""
+    """Return statistics of responses `of` for distributions `spread`; arguments as of `ffrobot.uncertainty`."""
     if by == "samples" and samples < FEWEST:
         raise InputError(f"uncertainty: expected at least {FEWEST} samples", samples)
     if by == "gradients" and indices:

@@ -116,7 +116,7 @@ def stable_depths(milling: Milling, free: FreeCoordinates, J: Array, axes: Array
 
     J (d, f): displacements of the tip, global axes, by the f coordinates of which `free` are combinations; SI units.
     `axes` (3, 3): axes of the tip in rows. `milling_best_depth`, m, is of the best feed, `milling_feed` (3,).
-    `milling_lobes` (S,), m, at S speeds: with averaged forces, of the worst feed at each; else of the worst feed above.
+    `milling_lobes` (S,), m, at S speeds: by averaged forces, of the worst feed at each, else that of `milling_depth`.
     """
     values, V = np.linalg.eigh((free.K + free.K.T) / 2)
     V = V[:, values < (2 * np.pi * milling.highest) ** 2]

@@ -52,11 +52,11 @@ class MovingBody:
         return of_quaternion(self.orientation)
 
     def turned(self, vectors: Array) -> Array:
-        """Return vectors (T, …, 3), any unit, from the axes of the frame in global axes: A times these."""
+        """Return `vectors` (T, …, 3), any unit, which are in axes of the frame, in global axes."""
         return np.einsum("tij,t...j->t...i", self.axes, vectors)
 
     def placed(self, places: Array) -> Array:
-        """Return R + A x (T, k, 3), m, global axes, of positions x (T, k, 3), m, in the frame."""
+        """Return positions (T, k, 3), m, global axes, of `places` (T, k, 3), m, in the frame."""
         return self.position[:, None] + self.turned(places)
 
     @property
@@ -69,7 +69,7 @@ class MovingBody:
         return self.placed(self.points + s * self.deflection) + (s - 1.0) * self.shift[:, None]
 
     def global_deflection(self, point: str) -> Array:
-        """Return the deflection A Φ p of a point (T, 3), m, in global axes."""
+        """Return the deflection of a point (T, 3), m, in global axes."""
         return self.turned(self.deflection[:, self.point_names.index(point)])
 
 

@@ -182,7 +182,7 @@ SYMMETRIC, IDENTITY = 2, 4  # values of `structure`
 
 
 class Taylor(NamedTuple):
-    """A matrix M0 (rows, columns) + Σ_l M1[:, l] q_l with M1 (rows, modes, columns), in the file's units."""
+    """A matrix M0 (rows, columns) + Σ_l M1[:, l] q_l of modal coordinates q; M1 (rows, modes, columns); file units."""
 
     m0: Array
     m1: Array

@@ -22,8 +22,7 @@ def draw_configurations(figure: FigureRecord, results: Results) -> Figure:
     """Draw the bodies of an analysis at the outputs nearest to `figure.times`, with paths.
 
     Paths are the curves of `figure`, by default those of points with trajectories or tools. Deflections are to scale in
-    planar scenes, else exaggerated for visibility, unless the figure says otherwise. Postures between the first and
-    the last are lines.
+    planar scenes, else exaggerated for visibility. Postures between the first and the last are lines.
     """
     assert figure.analysis is not None
     outputs = results.time(figure.analysis)

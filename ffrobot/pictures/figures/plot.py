@@ -288,7 +288,7 @@ FORMATS = ("png", "pdf")  # unless asked for otherwise
 def plot_file(path: Path, folder: Path, formats: Sequence[str] = FORMATS, only: Sequence[str] = ()) -> list[Path]:
     """Draw the figures of a results file, or mesh and modes of a modal body file, into `folder`; returns the files.
 
-    A file `figures.toml` next to the results describes the figures; without one, the main ones of the standard
+    A file `figures.toml` next to the results describes the figures; without one, the main standard
     figures are drawn. `only`: names of figures, or patterns such as "moment_*", or "*" for all. Each figure is written
     in all `formats`: "png", "pdf", "svg".
 

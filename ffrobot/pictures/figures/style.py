@@ -95,7 +95,7 @@ def shades(count: int) -> list[Any]:
 
 
 def literal(figure: Figure) -> Figure:
-    """Return the figure with `$`, `_`, `^` and backslashes of its texts drawn as they are: names are no formulas."""
+    """Return the figure with `$`, `_`, `^` and backslashes of its texts drawn as they are."""
     for axes in figure.axes:
         titles = (axes.title, axes._left_title, axes._right_title, axes.xaxis.label, axes.yaxis.label)  # type: ignore[attr-defined]
         legends = [one for one in (axes.get_legend(), *figure.legends) if one is not None]

@@ -128,7 +128,7 @@ FINEST = 32767  # a displacement of 1
 
 @struct
 class ModesOnPage:
-    """A modal body on the page, with the labels of the bodies that have it."""
+    """A modal body on the page: charts of its modes, labels of the bodies that have it."""
 
     labels: tuple[str, ...]
     body: ModalBody
@@ -177,7 +177,7 @@ def surface_modes(links: Sequence[ModesOnPage]) -> dict[str, Any]:
     """Return surfaces with mode shapes as data for the page's script; links without known surface are omitted.
 
     Each link has, in base64, `points` (p, 3), m, of a coarsened surface, its `triangles` (t, 3), and up to twelve
-    `modes` (m, p, 3): integers up to `FINEST`, times `amplitude` m.
+    `modes` (k, p, 3): integers up to `FINEST`, times `amplitude` m.
     """
     entries = []
     for link in links:

@@ -102,11 +102,11 @@ def vtkhdf_image(grid: Grid) -> bytes:
 
 
 def results_grid(results: Results, analysis: str, frames: Indices, notes: list[str]) -> Grid:
-    """Return the bodies of an analysis at the outputs `frames` (T,): r = R + A (x + Φ p), m, global axes.
+    """Return the bodies of an analysis at the outputs `frames` (T,), with positions r, m, global axes.
 
-    Point data: `deflection` A Φ p, and `exaggeration`, both m: r + (s − 1) exaggeration shows deformations s times as
-    large with closed joints. `von_mises`, Pa, where stresses of a surface are known. Cell data: `body`, its number in
-    the scene. Adds to `notes` on missing parts.
+    Point data, m, global axes: `deflection`, and `exaggeration`: r + (s − 1) exaggeration shows deformations s times
+    as large with closed joints. `von_mises`, Pa, where stresses of a surface are known. Cell data: `body`, its number
+    in the scene. Adds to `notes` on missing parts.
     """
     bodies = moving_bodies(results, analysis, frames)
     shapes = [surface_shape(results, body, notes) for body in bodies]
