@@ -242,7 +242,7 @@ class Results:
     def controllers(self, analysis: str) -> tuple[SampledController, ...]:
         """Return linear discrete-time controllers of a closed-loop run, one for each instant of a scheduled observer.
 
-        All have the same states; interpolated matrices approximate those of the run. Raises as `controller`.
+        All have the same states; interpolated matrices approximate those of the run. Raises `InputError` without any.
         """
         if not self.has(f"{analysis}/control/controller"):
             known = quoted(self._with("control/controller"))

@@ -144,7 +144,7 @@ def write_zero_dynamics(group: h5py.Group, _: Run, around: AroundPath) -> None:
 
 
 def write_placement(group: h5py.Group, _: Run, placed: Placed) -> None:
-    """Write placement/ of an analysis: reach of optimum and evenly spaced patches, and of one patch anywhere."""
+    """Write placement/ of an analysis: control of modes by optimum and evenly spaced patches, or one patch anywhere."""
     group, wanted = group.create_group("placement"), placed.wanted
     group.attrs.update(body=wanted.body, criterion=wanted.criterion, measure=wanted.measure)
     write_record(group, placed)

@@ -152,7 +152,7 @@ class Servo:
 
 
 def make_servo(model: Model, end: float, where: str, goes_on: Callable[[], bool], kind: str = "motors-only") -> Servo:
-    """The robot under a path that is held before 0 and after `end` (s), whose own points are the output.
+    """The robot under a path that rests before 0 and after `end` (s), whose own points are the output.
 
     `where` and `kind` are for messages; `Stopped` is raised when `goes_on` returns False. Raises `InputError` without
     modes, for a path that jumps or that the undeformed robot cannot follow, and unless motors and path components are

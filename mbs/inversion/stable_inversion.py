@@ -38,7 +38,7 @@ class Inversion:
 
     `unmet` is the largest residual modal force between collocation points, relative to the largest elastic one;
     `worst` (s) is when it occurs, or where iterations converge least; `off_rest` is the distance from rest at the
-    start, ‖(ω(p − p_0), ṗ)‖ relative to its peak.
+    start, relative to its peak.
     """
 
     servo: Servo

@@ -100,7 +100,7 @@ class FreeCoordinates(NamedTuple):
 class JointCondition:
     """Modes and compliance of a robot at one instant, with joints locked, or motors locked behind compliant gears."""
 
-    modes: RobotModes  # of the robot, its coordinates s left free; `modes.frequency` in Hz, the lowest first
+    modes: RobotModes  # of the free coordinates, the lowest first; `modes.frequency` in Hz
     # (k, k) by "BODY.POINT": translations (m) along the axes of the space, of a tool its own, then rotations (rad)
     # about them, by forces (N) and moments (N·m); infinite where a joint without a motor lets the robot move
     compliance: Mapping[str, Array]

@@ -46,8 +46,7 @@ class Rule(NamedTuple):
     # evaluations in the time of a step's linear algebra, for each coordinate: 1.0 to 1.6 of arms of 8 to 31
     of_algebra: float = 1.5
     short: float = 4000.0  # evaluations of a run: the choice itself takes the time of half of them
-    # times as slow as stable steps: what is expected of the other in a short run, which takes over if that is wrong by
-    # more than vibrations that are resolved explain
+    # in short runs, how many times as slow as DOP853 Radau is expected to be, which takes over where that is wrong
     last_resort: float = 100.0
 
     def cost_of_radau(self, coordinates: int, replay: float) -> float:

@@ -200,7 +200,7 @@ class Run:
         return self if self.look_closer is None else self.look_closer()
 
     def with_look(self, at: Callable[[Array], Run]) -> Self:
-        """Return the run with `look_closer` along its paths by `at`, which makes a run at any times (T,), s."""
+        """Return the run with a `look_closer` by `at`, which makes a run at times (T,), s, that resolve its paths."""
 
         @cache
         def look_closer() -> Run:

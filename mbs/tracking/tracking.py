@@ -196,11 +196,11 @@ class TrackedPath(AroundPath):
     tolerance_price: float | None  # V/m, decrease of the least voltage per path tolerance
     # largest deviation from the path with the same torques but no voltages, m or rad; NaN where not found
     without_patches: float = np.nan
-    is_needed: bool = True  # whether `without_patches` exceeds `path_tolerance`, and tolerance times the path's way
+    is_needed: bool = True  # whether `without_patches` exceeds `path_tolerance`, and tolerance times its range
 
 
 def least_voltage(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking) -> tuple[float, float]:
-    """Least voltage, V, and its uncertainty (see `TrackedPath`) for another model of the robot; NaN if not found."""
+    """Least voltage, V, and its uncertainty, V, for another model of the robot; NaN if not found."""
     posed = _pose(model, patches, analysis, lambda: True)
     least = settled(posed.asked, posed.coarse)
     voltage = least.share * float(posed.asked.units.max()) if least.converged else np.nan
