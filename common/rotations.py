@@ -68,13 +68,9 @@ def _value(m: int, x: Array) -> Array:
 def _closed(m: int, x: Array) -> Array:
     """c_m of x = φ² away from 0."""
     phi = np.sqrt(x)
-    of_m = (
-        np.cos,
-        lambda phi: np.sin(phi) / phi,
-        lambda phi: (1 - np.cos(phi)) / x,
-        lambda phi: (phi - np.sin(phi)) / (x * phi),
-    )
-    return of_m[m](phi)
+    if m < 2:
+        return np.sin(phi) / phi if m else np.cos(phi)
+    return (1 - np.cos(phi)) / x if m == 2 else (phi - np.sin(phi)) / (x * phi)
 
 
 def _of_skew(vectors: Array, first: int, second: int) -> Array:
@@ -94,7 +90,7 @@ def quaternions(C: Array) -> Array:
     trace = np.trace(C, axis1=-2, axis2=-1)
     diagonal = np.diagonal(C, axis1=-2, axis2=-1)
     squares = np.concatenate([1 + trace[..., None], 1 - trace[..., None] + 2 * diagonal], axis=-1)
-    axial = np.stack([C[..., 2, 1] - C[..., 1, 2], C[..., 0, 2] - C[..., 2, 0], C[..., 1, 0] - C[..., 0, 1]], axis=-1)
+    axial = C[..., (2, 0, 1), (1, 2, 0)] - C[..., (1, 2, 0), (2, 0, 1)]
     products = np.empty((*C.shape[:-2], 4, 4))  # 4 e eᵀ
     products[..., 0, 0] = squares[..., 0]
     products[..., 0, 1:] = products[..., 1:, 0] = axial
