@@ -125,7 +125,7 @@ def _straight(key: str, analyses: Sequence[Analysis], voltage: Sequence[TimeFunc
 def find_actuation(scene: Scene, run: Run, bodies: Bodies, patches: Mapping[str, LinkPatches]) -> Actuation:
     """Find voltages (V) of patches that come nearest to the modal forces of a motion, and judge all actuators.
 
-    Links with actuation points need no patches. No link does where a later analysis applies forces on paths.
+    Links with actuation points need no patches. No link does where a later analysis applies forces on paths or points.
     """
     from ..actuation.feasibility import find_unmet, judge_actuators, links_in_motion
 

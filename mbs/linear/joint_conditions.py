@@ -26,7 +26,7 @@ class RobotModes:
 
     poles: ComplexArray  # (f, 2) complex, 1/s
     # (f, s) complex, by mode the increments δs of s independent coordinates in the first pole's eigenvector, of unit
-    # kinetic amplitude (δsᴴ M δs = 1) and with its largest entry real
+    # kinetic amplitude (δsᴴ M δs = 1), the largest free coordinate real
     shape: ComplexArray
     motion: ComplexArray  # (f, coordinates) complex, the same as δq of all bodies
     round_off: float  # 1/s, by which a double pole at 0 may be off
@@ -45,7 +45,7 @@ class RobotModes:
 
     @property
     def damping_ratio(self) -> Array:
-        """Damping ratios (f,) −(λ₁ + λ₂)/2ω of pairs of poles; NaN for frequency 0."""
+        """Damping ratios (f,) −(λ₁ + λ₂)/2√(λ₁ λ₂) of pairs of poles; NaN for frequency 0."""
         omega = 2 * np.pi * self.frequency
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio: Array = np.where(omega > 0.0, -self.poles.sum(axis=1).real / (2 * omega), np.nan)

@@ -106,7 +106,7 @@ class MotorCoordinates(NamedTuple):
 
     Attributes:
         q, v, a: (T, n_q), (T, n_v), (T, n_v), SI units.
-        gears: by joint; {} where they are compliant in the run, too.
+        gears: by joint; {} where run and model have the same gears.
         moments: (T, k) N·m or N, by joint, of all motors; {} likewise.
     """
 
