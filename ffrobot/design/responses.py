@@ -269,7 +269,7 @@ class DesignProblem:
     def scaled(self, values: Sequence[float]) -> Array:
         """Return (1 + m,) scaled objective F, to be minimized, and constraints g ≤ 0, no unit, of values in SI units.
 
-        They are logarithms of values over their scales.
+        They are logarithms of values over their scales, below `LINEAR` tangents of them.
         """
         return self._scaled(values)[0]
 

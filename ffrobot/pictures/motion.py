@@ -220,7 +220,7 @@ class Marker:
 
 
 def joint_markers(scene: Mapping[str, Any], bodies: Sequence[MovingBody]) -> list[Marker]:
-    """Return every joint at its second side, with one axis, two (universal joints) or none."""
+    """Return joints at their second side, unless it is the ground, with one axis, two (universal joints) or none."""
     markers = []
     for keys in scene.get("joint", []):
         first, second = keys["between"]

@@ -13,7 +13,7 @@ struct MotionForces {
   RowMajor sections;    // of each section of bodies where joints, constraints or wrenches are: all that acts there
   RowMajor joints;      // of each body: what its joint does to its outer section
   RowMajor constraints; // of each: on its section a, then on its section b
-  RowMajor wrenches;    // of each section on which a wrench may act: given forces alone
+  RowMajor wrenches;    // of each section on which a wrench may act: given forces, and those along cut joints
   RowMajor modal;       // (n_v) see NewtonEuler::require_of_modes
   RowMajor rotors;      // 3 of each body: rate of angular momentum of the rotor in its joint
 };
