@@ -14,7 +14,6 @@ from ..common.files import write_atomically
 from ..common.hdf5 import image_of, in_memory
 from ..common.tables import as_csv
 from ..common.version import VERSION
-from ..mbs.posture.workspace import TURN
 from ..present.lines import print_table
 from .pose_map import STATUS, PoseMap
 
@@ -225,7 +224,7 @@ def _milling(poses: PoseMap) -> Iterator[str]:
 
 
 def _turn_axis(poses: PoseMap) -> int:
-    return [axis.name for axis in poses.plan.axes].index(TURN)
+    return [axis.is_turn for axis in poses.plan.axes].index(True)
 
 
 def _place(poses: PoseMap, number: int) -> str:

@@ -123,7 +123,7 @@ class MapPlan:
     @property
     def turned_about(self) -> Array | None:
         """Unit vector (3,) about which the grid turns a tool, in its axes, else global ones; None without turns."""
-        if self.milling is None or TURN not in [axis.name for axis in self.axes]:
+        if self.milling is None or not any(axis.is_turn for axis in self.axes):
             return None
         return np.array(self.milling.axis) / np.linalg.norm(self.milling.axis)
 
@@ -163,7 +163,7 @@ def plan_map(
     check_folder(folder)
     loaded = load_scene(scene)
     axes = parse_grid(over, loaded)
-    if milling is None and TURN in [axis.name for axis in axes]:
+    if milling is None and any(axis.is_turn for axis in axes):
         raise InputError(f"--over: {TURN}: expected --milling with the axis that the tool turns about", "none")
     keeps = orientation == "start"
     if orientation == "auto":

@@ -120,8 +120,8 @@ def stable_depths(milling: Milling, free: FreeCoordinates, J: Array, axes: Array
     """
     values, V = np.linalg.eigh((free.K + free.K.T) / 2)
     V = V[:, values < (2 * np.pi * milling.highest) ** 2]
-    rows = np.zeros((3, V.shape[1]))
-    rows[: len(J)] = J @ free.N @ V
+    rows = np.pad(J @ free.N @ V, ((0, 3 - len(J)), (0, 0)))
+    rows[np.abs(rows) < STILL] = 0.0
     tip, feeds = Tip(V.T @ free.K @ V, V.T @ free.D @ V, rows), milling.feeds(axes)
     omega, G = tip.response()
     limits = [stability_limits(milling.average, omega, across @ G @ across.T) for across in feeds]
@@ -149,6 +149,7 @@ FINE = 0.5  # rad, of the fastest mode in a step of semi-discretization
 STEPS = (80, 400)  # of a tooth period, at least and at most
 RISE = 1.25  # ratio of tried depths: above one with chatter may be others without
 THINNEST = 1e-12  # m: below it no depth is stable
+STILL = 1e-12  # 1/√kg: round-off of modes that do not move the tip
 
 
 class Tip(NamedTuple):

@@ -27,15 +27,20 @@ BEYOND = 1e3  # rad: postures beyond limits of joints come after all others
 
 @struct
 class GridAxis:
-    """Axis of a grid: coordinate of a joint (its `name`), "x", "y", "z" of a point, or "turn" of its body.
+    """Axis of a grid: coordinate of a joint (its `name`); if `is_place`, "x", "y", "z" of a point, "turn" of its body.
 
-    `values` (n,) are in `unit`, "rad" or "m"; `is_place`: x, y, z.
+    `values` (n,) are in `unit`, "rad" or "m".
     """
 
     name: str
     values: Array
     is_place: bool = False
     unit: str = "m"
+
+    @property
+    def is_turn(self) -> bool:
+        """Whether the body turns."""
+        return self.is_place and self.name == TURN
 
 
 class Postures(NamedTuple):
@@ -63,13 +68,13 @@ def grid_postures(
     """
     start, shape = undeformed_posture(model).q, tuple(len(axis.values) for axis in axes)
     values = np.stack(np.meshgrid(*(axis.values for axis in axes), indexing="ij"), axis=-1).reshape(-1, len(axes))
-    turn = next((values[:, k] for k, axis in enumerate(axes) if axis.name == TURN), np.zeros(1))
-    is_row, measured = np.array([axis.name != TURN for axis in axes]), np.zeros(len(axes))
+    turn = next((values[:, k] for k, axis in enumerate(axes) if axis.is_turn), np.zeros(1))
+    is_row, measured = np.array([not axis.is_turn for axis in axes]), np.zeros(len(axes))
     rows = [_row(model, axes[k], point, values[:, k]) for k in np.flatnonzero(is_row)]
     along = replace(model, rows=tuple(rows))
     measured[is_row] = along.constraints.values(start[None], np.zeros(1))[0][0] + values[0, is_row]
     if turned_about is not None:
-        kept = set("xyz") - {axis.name for axis in axes}
+        kept = set("xyz") - {axis.name for axis in axes if axis.is_place}
         place = model.tree.places(start[None]).at(model.tree.section(point)).r[0]
         rows += [_row(model, GridAxis(name, place, True), point, place[["xyz".index(name)]]) for name in sorted(kept)]
     if keeps_orientation or turned_about is not None:

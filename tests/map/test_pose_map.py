@@ -280,13 +280,14 @@ def test_names_with_blanks_and_limits_of_each_coordinate(tmp_path):
 
 
 def test_stable_depth_of_cut_is_that_of_the_response(arm, tmp_path):
-    """1/(2 max Re ν) of C̄ G, with G solved for line by line, of the worst of twelve feeds."""
+    """1/(2 max Re ν) of C̄ G, with G solved for line by line, of the worst of twelve feeds; a joint named "turn"."""
     scene = arm.with_name("damped.toml")
-    scene.write_text(ARM.replace("stiffness = 3000.0", "stiffness = 3000.0\ndamping = 3.0"))
+    damped = ARM.replace("stiffness = 3000.0", "stiffness = 3000.0\ndamping = 3.0")
+    scene.write_text(damped.replace("elbow", "turn"))
     keys = {"teeth": 2, "tangential": 6e8, "radial": 2e8, "entry": 0.0, "exit": 2.0, "highest": 40.0}
     (tmp_path / "cutter.toml").write_text(tomli_w.dumps(keys))
     milling = read_milling(tmp_path / "cutter.toml")
-    found = mapped(scene, tmp_path / "map", "shoulder=0.2:0.4:2", "elbow=0.8", milling=milling)
+    found = mapped(scene, tmp_path / "map", "shoulder=0.2:0.4:2", "turn=0.8", milling=milling)
     model = prepare_scene(scene).model
     linear, _ = PoseEvaluator(model, found.q[1], "fore.tip").linear_equations(found.q[1])
     N, K, D = free_coordinates(linear, "compliant")
