@@ -14,16 +14,14 @@ TIME, SAMPLES = "time", "control/time"
 
 def labelled(results: Results, analysis: str, histories: Sequence[str]) -> Dataset:
     """All `histories` of an analysis, and the samples of a closed loop; see `Results.to_xarray`."""
-    names = [name for name in histories if name != TIME]
-    is_sampled = results.has(f"{analysis}/{SAMPLES}")
-    if is_sampled:
-        inside = results.names(f"{analysis}/control")
-        names = [n for n in names if not n.startswith("control/")] + [f"control/{n}" for n in inside if n != TIME]
+    names = [name for name in histories if name != TIME and not name.startswith("control/")]
+    if is_sampled := results.has(f"{analysis}/{SAMPLES}"):
+        names += [f"control/{name}" for name in results.histories(f"{analysis}/control") if name != TIME]
     coordinates: dict[str, Any] = {}
     variables: dict[str, Any] = {}
     for name in names:
         values = results[f"{analysis}/{name}"]
-        dimensions = [SAMPLES if is_sampled and name.startswith("control/") else TIME]
+        dimensions = [SAMPLES if name.startswith("control/") else TIME]
         if values.ndim == 2:
             dimension, labels = _columns(results, analysis, name, values.shape[1])
             if dimension in coordinates and list(coordinates[dimension][1]) != labels:

@@ -94,6 +94,10 @@ def test_unstable_gains_are_reported_and_the_results_kept():
     assert len(results.time("calm/control/commands")) == len(results["calm/control/readings"]) == 50
     (figure,) = [figure for figure in standard_figures(results) if figure.name == "tip_error"]
     assert [curve.label for curve in figure.curves] == ["wild", "calm"]
+    pytest.importorskip("xarray")
+    dataset = results.to_xarray("calm")
+    assert dataset["control/readings"].dims == ("control/time", "readings")
+    np.testing.assert_array_equal(dataset["control/readings"], results["calm/control/readings"])
 
 
 def test_slow_sampling_is_warned_of():
