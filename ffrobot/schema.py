@@ -47,7 +47,7 @@ def schema(kind: str) -> dict[str, Any]:
 
 
 def scene_in(space: str | None) -> dict[str, Any]:
-    """The schema of scenes of a `space`, with its definitions; None: with all keys, as 3D scenes have them."""
+    """The schema of "planar" or "spatial" scenes, with definitions; None: with keys of both, written as in 3D."""
     from .scene.scene import SceneKeys
 
     generator = {PLANAR: _Planar, SPATIAL: _Spatial, None: _Described}[space]

@@ -31,7 +31,7 @@ SHOWN = 4  # names in the line that a model prints
 
 @struct
 class StateSpace:
-    """x' = A x + B u, or x(k+1) = A x + B u every `step` s; y = C x + D u, with names of states, inputs and outputs.
+    """x' = A x + B u (`step` 0) or x(k+1) = A x + B u every `step` s; y = C x + D u; states, inputs, outputs by name.
 
     Attributes:
         A, B, C, D: (n, n), (n, inputs), (outputs, n), (outputs, inputs), SI units.

@@ -405,7 +405,7 @@ class StructureEffect:
 
 
 def patched_body(spatial: Body, body: ModalBody, placed: Sequence[PlacedLayout]) -> Body:
-    """Add mass and stiffness of patches to a link or a piece of it, by the key `structural`; all modes are kept.
+    """Add mass and stiffness of patches, by their key `structural`, to `spatial`, made of `body`; all modes stay.
 
     Mass lies in the plane of the patches' normal at their offset from the axis, with its moment of inertia about the
     line that it is on. The stiffness is that of the `composite` section.

@@ -51,7 +51,10 @@ class Functions:
         return sp.csr_matrix((shapes.ravel(), (row, self.element[cell].ravel())), shape=(X.size, self.x.size))
 
     def root(self, weight: Array, derivative: int = 0) -> sp.csr_matrix:
-        """B (4e, size) with BᵀB = ∫ weight f⁽ᵈ⁾ g⁽ᵈ⁾ dx of shape functions, x in m, weights (e,), d = `derivative`."""
+        """B (4e, size) with BᵀB = ∫ weight f⁽ᵈ⁾ g⁽ᵈ⁾ dx of shape functions, d = `derivative`.
+
+        x is in m, weight (e,) in any unit.
+        """
         points, weights = leggauss(GAUSS)  # type: ignore[no-untyped-call, unused-ignore]
         elements = len(self.element)
         values = self._within(np.repeat(np.arange(elements), GAUSS), np.tile(0.5 * (points + 1), elements), derivative)

@@ -48,11 +48,11 @@ class Product(Protocol):
 
 
 class KrylovSchur:
-    """Search for the lowest eigenpairs of K x = ω² M x, which goes on where it ended when more are needed.
+    """Search for the lowest eigenpairs of K x = ω² M x, SI units, ω in rad/s; methods are collective.
 
-    `flexibility` F (m, m), K⁻¹ under the supports, is symmetric, of a `rank`; `mass` M positive definite. Of vectors
-    that the processes `comm` share, each has its own m `rows`; `total` sums an array over them. Methods are collective.
-    `tolerance`: residual, relative to θ = 1/ω², of a converged mode. `solver` finds the modes, SLEPc or block Lanczos.
+    `flexibility` F (N, N), K⁻¹ under the supports, is symmetric; its `rank` is the number of modes. `mass` M (N, N) is
+    positive definite. Each process of `comm` has its m `rows` of vectors (N,); `total` sums an array over processes.
+    `tolerance`: residual, relative to θ = 1/ω², of a converged mode.
     """
 
     def __init__(

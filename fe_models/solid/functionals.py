@@ -101,7 +101,7 @@ def _on_face(mesh: Mesh, facet_tags: MeshTags, tag: int, **metadata: int) -> ufl
 
 
 def section_averages(model: SolidModel, x: Array) -> Averages:
-    """Mean motion of the cross sections at `x` (k,) in m; collective."""
+    """`Averages` of cross sections at `x` (k,), m: six functionals of u each, which `of` evaluates; collective."""
     element, nodes = lagrange_element(model.V), node_map(model.V)
     degree = model.order + model.mesh.geometry.cmap.degree
     size = model.V.dofmap.index_map.size_local + model.V.dofmap.index_map.num_ghosts

@@ -115,9 +115,9 @@ INSIDE, ON_CURVED_FACE = 1e-6, 0.02
 def recovered_stresses(
     link: SolidLink, model: SolidModel, modes: Array, shapes: Array, surface: Array, path: Path
 ) -> dict[str, Any]:
-    """Compute the stresses that a link file requests: `stress` … `surface_static` of its `ModalBody`.
+    """Compute the stresses that a link file (`path`) requests: fields of its `ModalBody`, in its units, by name.
 
-    `modes` (3 (owned + ghosts), n); `shapes` (3 owned, l), m, under unit loads; `surface` (p, 3), m, its points.
+    `modes` (3 (owned + ghosts), n), 1/√kg; `shapes` (3 owned, l), m, under unit loads; points `surface` (p, 3), m.
     """
     if not (link.stress.points or link.stress.surface):
         return {}

@@ -85,9 +85,9 @@ class DesignVariable:
         return self.high - self.low
 
     def step(self, u: float, relative: float) -> float:
-        """Return a step of u that changes the number x by `relative` of itself, or of the range if that is smaller.
+        """Return a step of u, the coordinate (0 to 1) of the number x, that changes x by `relative` |x|.
 
-        Near x = 0, x changes by `relative` of a thousandth of the range.
+        |x| counts as 0.001 to 1 of the range.
         """
         span = self.high - self.low
         return float(relative * np.clip(abs(self.values(u)[0]), 1e-3 * span, span) / self.slope(u))

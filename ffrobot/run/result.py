@@ -77,8 +77,8 @@ class Histories:
 
     Attributes:
         prepared: the scene.
-        run: the motion at all these times.
-        outputs: (T,) numbers of the times that are outputs.
+        run: the motion at all these T times.
+        outputs: numbers of those that are outputs.
     """
 
     prepared: Prepared = field(repr=False)
@@ -87,7 +87,7 @@ class Histories:
 
     @cached_property
     def reactions(self) -> Mapping[str, Wrench]:
-        """Forces (N) and moments (N·m) in joints at these times, by the joint's name."""
+        """By joint the force (T, 3), N, on its second side, and moment (T, 3), N·m, about that side, global axes."""
         return reactions(self.run)
 
     @cached_property

@@ -45,11 +45,11 @@ def accelerations(path: Piecewise) -> tuple[Array, Array]:
 
 @struct
 class Modes:
-    """Small vibrations of the robot at one posture with its motors at rest, the slowest first: m of them.
+    """Small vibrations of the robot at one posture with its motors at rest, the slowest first: k of them.
 
     Attributes:
-        omega, ratio: (m,) rad/s, and damping ratios.
-        driven: (m, n) acceleration of each mode at the point, per acceleration of each motor; m/s² per rad/s² or m/s².
+        omega, ratio: (k,) rad/s, and damping ratios.
+        driven: (k, n) acceleration of `Robot.point` in each mode's direction, by each motor's: m/s² per rad/s² or m/s².
     """
 
     omega: Array
@@ -57,9 +57,9 @@ class Modes:
     driven: Array
 
     def left(self, times: Array, accelerations: Array) -> ComplexArray:
-        """Complex amplitudes (m, n), m, at the point at the last of `times` (T,), s, of each mode by each motor.
+        """Complex amplitudes (k, n), m, of each mode by each motor at the last of `times` (T,), s.
 
-        `accelerations` (T, n), rad/s² or m/s², are those of the motors.
+        They are at `Robot.point`, in the mode's direction. Motors have `accelerations` (T, n), rad/s² or m/s².
         """
         poles = self.omega * (-self.ratio + 1j * np.sqrt(1.0 - self.ratio**2))
         widths = (np.append(0.0, np.diff(times)) + np.append(np.diff(times), 0.0)) / 2

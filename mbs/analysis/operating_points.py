@@ -200,7 +200,7 @@ def row_at(path: Path, analysis: Analysis, source: Run, t: float) -> int:
 
 @struct
 class RobotAtRest(Details):
-    """Natural frequencies and compliance in the equilibrium at t = 0, by condition: joints "locked" or "compliant"."""
+    """Natural frequencies and compliance in equilibrium: by `times` (0 alone), by joints "locked" or "compliant"."""
 
     conditions: tuple[Mapping[str, JointCondition], ...]
     times = (0.0,)

@@ -298,10 +298,7 @@ def _choose_output(servo: Servo, analysis: MotorsOnly) -> tuple[Servo, Linearisa
 
 
 def _with_expected_deflections(servo: Servo, end: float) -> tuple[Servo, Linearisation]:
-    """The part of the deflections that the output leaves out, replaced by what the path's loads bend without vibration.
-
-    A function of time alone: it changes the output's target, not its zeros.
-    """
+    """The robot with `offset`: a function of time alone, it changes the output's target, not its zeros."""
     times = np.linspace(0.0, end, SAMPLES)
     sag = shape_along(replace(servo, factor=1.0), times)
     offset = [f.held(0.0, end) for f in spline(times, (1 - servo.factor) * sag, at_rest=True)]

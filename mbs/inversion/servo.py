@@ -44,7 +44,7 @@ class Servo:
     Attributes:
         where: scene and analysis, for messages.
         goes_on: is called often; False stops the solution.
-        offset: expected share of deflections that the output leaves out, m·√kg, by mode of all bodies, or ().
+        offset: functions of time, m·√kg, one per mode of all bodies: 1 − `factor` of quasi-static p; () for 0.
     """
 
     model: Model
@@ -75,7 +75,7 @@ class Servo:
 
     @property
     def functions(self) -> list[TimeFunction]:
-        """Functions of time, s, that the path follows: m, rad."""
+        """Functions of time, s, one per component of trajectories, in the scene's order: m, rad, of directions 1."""
         return [function for path in self.model.scene.trajectory for _, function in path.targets]
 
     def slowed(self, factor: float) -> Servo:

@@ -34,7 +34,7 @@ PROBES = np.sort(np.concatenate([(GAUSS.c[1:] + GAUSS.c[:-1]) / 2, [0.01, 0.5, 0
 
 @struct
 class Inversion:
-    """`curve` p(t), m·√kg, from before the path to after it, and how it was found.
+    """`curve` p(t) (n,), m·√kg, from before the path to after it, and how it was found.
 
     `unmet` is the largest residual modal force between collocation points, relative to the largest elastic one;
     `worst` (s) is when it occurs, or where iterations converge least; `off_rest` is the distance from rest at the

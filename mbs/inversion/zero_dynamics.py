@@ -37,7 +37,10 @@ class LinearDynamics:
 
 
 def linear_dynamics(servo: Servo, times: Array, p: Array, v: Array, a: Array) -> LinearDynamics:
-    """Derivatives of residual modal forces at N `times` (N,), s, with p, ṗ = v, p̈ = a (N, n), m·√kg and s."""
+    """Derivatives by p̈, ṗ and p of modal forces that motors do not supply: M, D, K (N, n, n), at `times` (N,), s.
+
+    p, ṗ = v and p̈ = a are (N, n), m·√kg and s.
+    """
     return LinearDynamics(times, *(x[:, : p.shape[1]] for x in servo.slopes(times, p, v, a)))
 
 
@@ -132,7 +135,7 @@ class Linearisation:
     def _followed(self) -> tuple[NDArray[np.int_], Booleans]:
         """Where the zeros at t = 0 stand (N, 2n) at all times, those that move least, and which of them jump (2n,).
 
-        Ways are shares of sizes, so that those of fast zeros, which pass through infinity, do not outweigh others.
+        Ways are relative, so that fast zeros, which pass through infinity, do not outweigh others.
         """
         places = np.tile(np.arange(self.zeros.shape[1]), (len(self.zeros), 1))
         jumps = np.zeros(self.zeros.shape[1], dtype=bool)

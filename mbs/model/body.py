@@ -166,9 +166,9 @@ class Body(Invariants):
 
     @cached_property
     def on_file(self) -> Array:
-        """Matrix (n, n_file), without unit: F_p times it are the equivalent forces on the modes of the file.
+        """Matrix (n, n_file), without unit: modal forces F_p (n,) times it do the same work on the file's modes.
 
-        With fewer modes than the file, they are those of loads at the loaded points, which act on all modes.
+        After `truncation.with_fewer_modes`, these forces are those of loads at its `loaded` points.
         """
         if self.reduction is not None:
             return self.reduction.lift.T @ self.whole.on_file

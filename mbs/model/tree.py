@@ -52,7 +52,7 @@ class CompliantGear(NamedTuple):
         return way, rate
 
     def round_off(self, q: Array) -> float:
-        """Return the round-off of the spring's torque by that of angles, relative to the largest torque at q (T, n_q).
+        """Return the round-off of the spring's torque, relative to the largest at q (T, n_q), rad and m.
 
         0 where all torque is round-off.
         """
@@ -125,9 +125,9 @@ class KinematicTree:
         return self.section(*first, joint.at), self.section(*second, joint.at)
 
     def with_outputs(self, outputs: Sequence[tuple[JointRecord, str, Section]]) -> KinematicTree:
-        """Return the tree with the output of a rotor's gear for each (joint, name, section).
+        """Return the tree with the output of a rotor's gear for each (joint, output's name, section).
 
-        It is a massless body that turns or slides on this section as the joint does. Outputs come after all bodies.
+        It is a massless body that moves on this section as the joint does. Outputs come after all bodies.
         """
         tree, nodes = copy.copy(self), list(self.nodes)
         for joint, label, inner in outputs:
@@ -190,7 +190,7 @@ class KinematicTree:
 def _node_at(
     q: int, v: int, body: Body, joint: JointRecord, inner: Section, outer: Section, *, backwards: bool = False
 ) -> Node:
-    """The node whose joint's coordinates begin at q and v, with those of the modes after them."""
+    """The node whose joint's coordinates begin at q and v, before its modes."""
     p_q, p_v, n = q + joint.q_count, v + joint.freedoms, body.n_modes
     along = {"q": slice(q, p_q), "p_q": slice(p_q, p_q + n), "v": slice(v, p_v), "p_v": slice(p_v, p_v + n)}
     return Node(body, joint, backwards, inner, outer, **along)

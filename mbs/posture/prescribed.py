@@ -25,7 +25,10 @@ class Prescribed(NamedTuple):
 
 
 def following_motors(model: Model, q: Array | None = None) -> Model:
-    """The robot with constraints on its motors' coordinates in place of paths: to stay as at q (n_q,), where given."""
+    """The robot with motors that stay as at q (n_q,), rad and m, in place of paths.
+
+    None: their equations have no `target`; `RedefinedMotion` of the core sets it.
+    """
     rows = [row for row in model.rows if not row.is_trajectory]
     for joint, coordinates in model.motors.items():
         node = model.driven(joint)

@@ -25,10 +25,10 @@ JOLT = 0.01  # of the largest deformation: where more begins to ring at once, mo
 
 
 class Start(NamedTuple):
-    """Start of a run, coordinates scaled by the robot: M (n_v, n_v), C_q (constraints, n_v), accelerations a (n_v,).
+    """Start of a run, coordinates divided by `Model.natural_sizes`, without unit.
 
-    `stiffness` (n_v,), `damping` (n_v, n_v) and `late` (n_v,), s², are 0 except for modal coordinates, of which `late`
-    is the estimated error by too few modes per acceleration.
+    M (n_v, n_v), kg·m², C_q (constraints, n_v), accelerations a (n_v,), 1/s². Of modes alone, else 0: `stiffness`
+    (n_v,), J, `damping` (n_v, n_v), J·s, and `late` (n_v,), s², their estimated error per acceleration.
     """
 
     M: Array
@@ -37,7 +37,7 @@ class Start(NamedTuple):
     stiffness: Array
     damping: Array
     late: Array
-    largest: float  # Σ pᵀ K p over the run, J
+    largest: float  # J, most of Σ pᵀ K p, over bodies, in the run
     duration: float  # s
 
 
@@ -102,7 +102,7 @@ def start_errors(start: Start) -> tuple[float, float]:
 
 
 def start_of_motion(run: Run) -> Start:
-    """Return what `start_errors` needs: matrices, accelerations at the start, largest strain energy, duration."""
+    """Return what `start_errors` needs."""
     tree, n_v = run.model.tree, run.model.tree.n_v
     stiffness, late, damping = np.zeros(n_v), np.zeros(n_v), np.zeros((n_v, n_v))
     energy = np.zeros(len(run.time))

@@ -69,10 +69,10 @@ class GearedServo(Servo):
         return M, D, K
 
     def reactions(self, times: Array, p: Array, v: Array, a: Array) -> Array:
-        """Return what a twist δ̈ (rad/s²) of each of k gears requires, per unit of its rotor's I δ̈, at `times` (N,), s.
+        """Return what the torque I δ̈, N·m, of each of k rotors adds to `forces`, per N·m: (N, k, n + motors).
 
-        (N, k, n + motors): modal forces and motor torques, by the rotor's moment on its carrier. `p`, `v`, `a` (N, n)
-        are the modal coordinates, m·√kg, and their time derivatives.
+        Modal forces, N/√kg, and torques of motors, N·m or N, but 0 of its own. At `times` (N,), s; p, ṗ = v and p̈ = a
+        are (N, n), m·√kg and s.
         """
         M, shares = super().slopes(times, p, v, a)[0], list[Array]()
         for servo, column in zip(self.without, p.shape[1] + self.gears.columns, strict=True):

@@ -165,7 +165,10 @@ def displaced_at(servo: Servo, times: Array, off: Array) -> Servo:
 
 
 def displaced_along(servo: Servo, error: PPoly) -> Servo:
-    """The robot with the k coordinates of `rows_of_points` off their paths by `error`(t) (k,), m, in quintic pieces."""
+    """The robot with coordinates of points off their paths by `error`(t) (k,), m, in the order of `rows_of_points`.
+
+    The new paths are quintic pieces.
+    """
     times = np.union1d(error.x, np.linspace(error.x[0], error.x[-1], PIECES + 1))
     off = np.array([error(times, order) for order in range(3)])
     return _with_targets(servo, lambda target, k: through(times, target.sample(times) + off[:, :, k]))
@@ -188,7 +191,6 @@ def forces_off_path(servo: Servo, times: Array, motion: Sequence[Array], off: Ar
 
 
 def _with_targets(servo: Servo, moved: Callable[[TimeFunction, int], TimeFunction]) -> Servo:
-    """The robot with the path `moved`(path, k) of the kth coordinate of points."""
     rows = list(servo.model.rows)
     for k, number in enumerate(rows_of_points(servo)):
         if (target := rows[number].target) is not None:

@@ -127,7 +127,7 @@ class Parallel(Drawing):
 
 
 class Progress(Drawing):
-    """Response of the designs in their order; `best`: the best so far that satisfies all limits."""
+    """Response by design: one entry of `values`, `states` and `best` (so far, within limits) for each, in order."""
 
     kind: Literal["progress"] = "progress"
     y_label: str
