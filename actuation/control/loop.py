@@ -100,9 +100,12 @@ class AmplifiedLoop:
         directions: Array,
         splits: tuple[int, int],
     ) -> None:
-        # steps of a sample: two in the shortest time constant, four where rates or currents have limits, at most 20
+        # steps of a sample: two in the shortest time constant, four where rates or currents have limits, at most 20,
+        # as few as divide delays
         lag = amplifiers.lag[amplifiers.lag > 0.0].min(initial=np.inf)
-        self._parts = int(np.clip(np.ceil(2 * T / lag), 4 if amplifiers.has_rates else 1, 20))
+        parts = np.arange(np.clip(np.ceil(2 * T / lag), 4 if amplifiers.has_rates else 1, 20), 21)
+        late = np.outer(parts, amplifiers.delay / T)
+        self._parts = int(parts[np.abs(late - np.rint(late)).max(axis=1).round(1).argmin()])
         self._loop, self._at_sample, self._samples, self._amplifiers = loop, at_sample, samples, amplifiers
         self._directions, self._v, self._h = directions, slice(*splits), T / self._parts
         self.times: Array = (samples[:, None] + self._h * np.arange(self._parts)).ravel()
@@ -132,9 +135,9 @@ class AmplifiedLoop:
         """Mean over a step from `t` (s) on of a command that acts `delay` (s) after its sample, once it changes."""
         loop, h = self._loop, self._h
         k = int(np.searchsorted(self._samples[: loop.taken], t + h * (1.0 - 1e-9) - delay, side="right"))
-        known = [loop.first[column], *loop.commands[max(k - 2, 0) : k, column]]
-        late = 0.0 if k == 0 else float(np.clip((self._samples[k - 1] + delay - t) / h, 0.0, 1.0))
-        return float((1.0 - late) * known[-1] + (late * known[-2] if late else 0.0))
+        known = [loop.first[column]] * 2 + [*loop.commands[max(k - 2, 0) : k, column]]
+        late = np.clip((self._samples[k - 1] + delay - t) / h, 0.0, 1.0)
+        return float((1.0 - late) * known[-1] + late * known[-2])
 
 
 def measure(run: LoopMotion, setup: Setup, loop: Loop, lowest: float, is_stable: bool | None) -> Metrics:

@@ -183,6 +183,22 @@ def test_fast_voltages_of_a_long_run():
     assert np.median(missed) < 1e-3
 
 
+def test_a_delay_of_amplifiers_is_one_of_the_loop():
+    """Without motors it does not matter where commands wait for a part of a sample."""
+    damper = {"kind": "modal-velocity", "bodies": ["link"], "modes": 2, "damping_ratio": 0.1, "sensor": "ideal"}
+    blow = {"point": "link.tip", "y": "where(t < 0.005, 1, 0)"}
+    of_loop = {"name": "loop", "kind": "closed-loop", "actuation": "still", "sample_time": 1e-3, "start": "scene"}
+    of_loop |= {"controller": [damper], "disturbance": [blow]}
+    still = {"name": "still", "kind": "pcid", "end": 0.05, "output_step": 0.005}
+    found = []
+    for late, of_amplifier in ((1.7e-3, 0.0), (0.0, 1.7e-3)):
+        patches = layout(amplifier={"delay": of_amplifier}).model_dump(exclude_unset=True)
+        results = ffrobot.solve(one_link("link", paper_link(), still, of_loop | {"delay": late}, pzt=[patches]))
+        found.append(results["loop/control/commands"])
+    assert np.ptp(found[0]) > 1.0
+    np.testing.assert_allclose(found[1], found[0], atol=1e-9 * np.ptp(found[0]))
+
+
 def test_hysteresis_leaves_a_path_and_its_inverse_comes_back(solved):
     """Tracking plans without it; replays and a loop without controllers, sampled fast, act through it.
 
