@@ -186,8 +186,8 @@ template <class Space> void bind_kinematics(nb::class_<Model<Space>> model) {
           },
           "q"_a, "v"_a,
           "(T, 18 (bodies + wrenches)) of states q (T, n_q), v (T, n_v): position (m), axes (3, 3) row by row, "
-          "velocity "
-          "and\nangular velocity of frames, which may sit at joints, and of sections on which wrenches may act.")
+          "velocity and\nangular velocity of frames, which may sit at joints, and of sections on which wrenches may "
+          "act.")
       .def(
           "moved",
           [](const Model<Space> &model, RowMajor q, const RowMajor &step) {

@@ -224,8 +224,7 @@ void bind_joint_forces(nb::class_<Scene> scene) {
           },
           "a"_a, "b"_a, "turns"_a, "axis"_a, "viscous"_a, "coulomb"_a, "speed"_a,
           "Friction in a joint at which a loop is cut, between two wrenches of the model: of the turn of b about an "
-          "axis "
-          "of a, or of its way along it.");
+          "axis of a, or of its way along it.");
 }
 
 void bind_scene(nb::module_ &m) {

@@ -233,8 +233,7 @@ template <class Space> void bind_motion(nb::module_ &m, const std::string &space
       .def("left_on_modes", &left_on_modes<Space>, "times"_a, "p"_a, "p_dot"_a, "p_ddot"_a, "near"_a,
            "(q (T, n_q), forces on modes (T, n)) that neither motors, or constraint equations without any, nor loads "
            "supply,\nwith modes of all bodies (T, n), from postures near (T, n_q), or each from the last, the first "
-           "near "
-           "(1, n_q);\nNaN where none is found.")
+           "near (1, n_q);\nNaN where none is found.")
       .def("derivatives", &derivatives_of<Space>, "times"_a, "p"_a, "p_dot"_a, "p_ddot"_a, "near"_a,
            "(M, D, K), (T, (n + motors) n) each: exact derivatives of these forces, and of torques, by p_ddot, p_dot\n"
            "and p, less what motors that turn frames do beside.")

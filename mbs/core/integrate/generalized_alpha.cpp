@@ -20,7 +20,7 @@ GeneralizedAlpha::GeneralizedAlpha(OdeSystem &system, double spectral_radius)
       alpha_f_(spectral_radius / (spectral_radius + 1)), beta_(0.25 * std::pow(1 + alpha_f_ - alpha_m_, 2)),
       gamma_(0.5 + alpha_f_ - alpha_m_), leading_((1 - alpha_m_) / (1 - alpha_f_)), v_dot_(n_), next_v_dot_(n_),
       previous_v_dot_(n_), drift_(n_), a_(n_), next_a_(n_), position_correction_(n_), change_(2 * n_), excess_(n_),
-      x_(n_), c_(value_) {}
+      force_(system.n_stiff()), x_(n_), c_(value_) {}
 
 // Consistent initial accelerations, C_tt included, are the first slope. The method's own lie alpha_m - alpha_f steps
 // ahead: their rate is taken from a difference.

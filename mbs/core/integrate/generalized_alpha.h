@@ -35,7 +35,7 @@ private:
   double damping_factor_ = 0, stiffness_factor_ = 0;
   // v_dot: accelerations at the start, end and before; a: the method's own, behind them by alpha_m - alpha_f steps
   VectorXd v_dot_, next_v_dot_, previous_v_dot_, drift_, a_, next_a_, position_correction_;
-  VectorXd change_, excess_, x_, c_;
+  VectorXd change_, excess_, force_, x_, c_;
   double previous_step_ = 0;
   bool started_ = false;
 };

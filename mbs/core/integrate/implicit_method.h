@@ -27,8 +27,7 @@ public:
 protected:
   explicit ImplicitMethod(OdeSystem &system)
       : system_(system), n_(system.n_v()), end_(2 * n_), start_(end_), first_slope_(end_), last_slope_(end_),
-        force_(system.n_stiff()), value_(system.constraints()), rate_(value_), none_(VectorXd::Zero(system.n_stiff())),
-        correction_(n_) {}
+        value_(system.constraints()), rate_(value_), none_(VectorXd::Zero(system.n_stiff())), correction_(n_) {}
 
   virtual bool correct(double t) { return project(t); } // moves end_ back onto the invariants; false where that fails
 
@@ -47,7 +46,7 @@ protected:
 
   OdeSystem &system_;
   Index n_; // n_v: half the size of y
-  VectorXd end_, start_, first_slope_, last_slope_, force_, value_, rate_;
+  VectorXd end_, start_, first_slope_, last_slope_, value_, rate_;
   double t0_ = 0, h_ = 0;
   bool stale_ = true; // the geometry of the last factorisation
 

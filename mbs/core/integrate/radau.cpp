@@ -44,25 +44,13 @@ constexpr double slow_contraction = 0.02; // geometry is taken anew when Newton'
 
 Radau::Radau(OdeSystem &system)
     : ImplicitMethod(system), Z_(MatrixXd::Zero(2 * n_, 3)), W_(Z_), F_(Z_), change_(Z_), collocation_(Z_), slopes_(Z_),
-      previous_slopes_(Z_), stage_(2 * n_), real_(2 * n_), unknown_(n_), complex_(2 * n_),
-      complex_force_(system.n_stiff()), complex_unknown_(n_) {}
+      previous_slopes_(Z_), stage_(2 * n_), real_(2 * n_), complex_(2 * n_),
+      linear_({VectorXd(system.n_stiff()), VectorXd(n_)}, {VectorXcd(system.n_stiff()), VectorXcd(n_)}) {}
 
 // With b = r_v + mu r_q the equation (mu I - J) (dq, dv) = (r_q, r_v) is N dq + C_q^T nu = (M b + D r_q) / mu^2,
 // C_q dq = C_q b / mu^2, N = M + D / mu + K / mu^2; dq = b / mu^2 + x leaves forces on the modes alone.
 template <class Scalar> void Radau::solve(Scalar mu, Matrix<Scalar, Dynamic, 1> &x) {
-  constexpr bool is_real = std::is_same_v<Scalar, double>;
-  auto &force = [&]() -> auto & {
-    if constexpr (is_real)
-      return force_;
-    else
-      return complex_force_;
-  }();
-  auto &unknown = [&]() -> auto & {
-    if constexpr (is_real)
-      return unknown_;
-    else
-      return complex_unknown_;
-  }();
+  auto &[force, unknown] = std::get<Linear<Scalar>>(linear_);
   const Scalar inverse = Scalar(1) / mu, inverse_square = inverse * inverse;
   auto r_q = x.head(n_), b = x.tail(n_);
   b += mu * r_q;
@@ -76,7 +64,7 @@ template <class Scalar> void Radau::solve(Scalar mu, Matrix<Scalar, Dynamic, 1> 
     const auto row = system_.coupling().col(i - n_).transpose().template cast<Scalar>();
     force[i] = stiff_force(i, (row * r_q).value(), (row * b).value());
   }
-  if constexpr (is_real)
+  if constexpr (std::is_same_v<Scalar, double>)
     system_.solve(force.data(), nullptr, unknown.data());
   else
     system_.solve(force.data(), unknown.data());

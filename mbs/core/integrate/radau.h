@@ -5,6 +5,8 @@
 
 #include "core/integrate/implicit_method.h"
 
+#include <tuple>
+
 namespace ffrobot {
 
 class Radau final : public ImplicitMethod {
@@ -41,8 +43,12 @@ private:
   MatrixXd Z_, W_, F_, change_;       // (2n, 3): stages less y, the same in eigenvectors, slopes, Newton's step
   MatrixXd collocation_;              // (2n, 3) coefficients of the last accepted step's polynomial
   MatrixXd slopes_, previous_slopes_; // (2n, 3) of that polynomial at its stages, and of the one before
-  VectorXd stage_, real_, unknown_;
-  VectorXcd complex_, complex_force_, complex_unknown_;
+  VectorXd stage_, real_;
+  VectorXcd complex_;
+  template <class Scalar> struct Linear { // of solve()
+    Matrix<Scalar, Dynamic, 1> force, unknown;
+  };
+  std::tuple<Linear<double>, Linear<Complex>> linear_;
   double factorised_step_ = 0, previous_step_ = 0, contraction_ = 1, weight_ = 1;
 };
 

@@ -36,9 +36,8 @@ template <class Space>
 RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t,
                                         const double *q, const double *v, const ZeroOrderHold *held,
                                         ExternalForces *external)
-    : OdeSystem(ConfigurationSpace(mechanism.n_v, mechanism.rotations)), mechanism_(mechanism), scene_(scene),
-      workspace_(mechanism), measured_(mechanism), forces_(mechanism, scene, held, external),
-      laws_(scene, mechanism.constraints.size()), norm_(mechanism), newton_(mechanism, scene),
+    : NewtonSystem<Space>(mechanism, scene), workspace_(mechanism), measured_(mechanism),
+      forces_(mechanism, scene, held, external), laws_(scene, mechanism.constraints.size()), norm_(mechanism),
       value_(VectorXd::Zero(mechanism.constraints.size())), rate_(value_), correction_(VectorXd::Zero(mechanism.n_v)),
       state_(VectorXd::Zero(mechanism.n_q + mechanism.n_v)), shifted_(VectorXd::Zero(2 * mechanism.n_v)),
       unused_(correction_) {
@@ -47,7 +46,7 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
     keep_independent_constraints(q, v, workspace_);
   else if (!mechanism.constraints.empty())
     evaluate(t, q, v, correction_.data()); // projections need its factors
-  newton_.keep(workspace_.active);
+  at_rest_.keep(workspace_.active);
   for (const int r : workspace_.active)
     if (const Constraint &of = mechanism.constraints[r]; forces_.acts() && of.model.kind == ConstraintKind::coordinate)
       borne_.push_back({mechanism.nodes[of.node].v + of.freedom, r, 0});
@@ -81,7 +80,7 @@ template <class Space> void RecursiveMotion<Space>::plan(double begin, double en
 template <class Space> void RecursiveMotion<Space>::turn_markers(double t) {
   for (const DrivenMarker &driven : scene_.driven) {
     const std::size_t i = driven.marker;
-    workspace_.turning[i] = measured_.turning[i] = newton_.workspace().turning[i] = driven.law(t);
+    workspace_.turning[i] = measured_.turning[i] = at_rest_.turning[i] = driven.law(t);
   }
 }
 
@@ -121,7 +120,7 @@ template <class Space> void RecursiveMotion<Space>::slope(double t, const double
   local().rate(z, z_dot);
   evaluate_here(t, q, v, z_dot + n_v());
   if (loops_ && !loops_->has_begun())
-    loops_->begin_at(q, workspace_, newton_.workspace());
+    loops_->begin_at(q, workspace_, at_rest_);
 }
 
 template <class Space> void RecursiveMotion<Space>::round_off(const double *z, double relative, double *z_dot) {
@@ -144,12 +143,7 @@ Placed<Space, double> RecursiveMotion<Space>::residuals(double t, const double *
   return at;
 }
 
-template <class Space> double RecursiveMotion<Space>::project(double t, double *q, double *v) {
-  return project(t, q, v, measured_);
-}
-
-template <class Space>
-double RecursiveMotion<Space>::project(double t, double *q, double *v, Workspace<Space, double> &w) {
+template <class Space> double RecursiveMotion<Space>::project(double t, double *q, double *v, bool is_next) {
   // Rounding of positions, moved into fast modes, is noise in their forces.
   constexpr double tolerance = 1e-12;
   constexpr int refresh_after = 3, most_iterations = 12;
@@ -158,11 +152,11 @@ double RecursiveMotion<Space>::project(double t, double *q, double *v, Workspace
   Map<VectorXd> v_(v, n_v());
   double left = 0, previous = std::numeric_limits<double>::infinity();
   for (int i = 0; i < most_iterations; ++i) {
-    const auto at = residuals(t, q, v, w);
+    const auto at = residuals(t, q, v, is_next ? workspace_ : measured_);
     const double position = norm_.sizes().of_values(value_, q);
     left = std::max(position, norm_.sizes().of_rates(rate_, v));
     if (!(left > tolerance) || (left < is_on && left > 0.2 * previous)) { // done, at the rounding floor, or NaN
-      if (&w == &workspace_)
+      if (is_next)
         placed_.emplace(at);
       break;
     }
@@ -192,7 +186,7 @@ template <class Space> bool RecursiveMotion<Space>::correct(double t, double *z)
 template <class Space> bool RecursiveMotion<Space>::finish(double t, double *z, double *z_dot) {
   if (forces_.acts() || !local().space().is_flat())
     return correct(t, z) && (slope(t, z, z_dot), true);
-  const bool is_on_constraints = project(t, z, z + n_v(), workspace_) < is_on;
+  const bool is_on_constraints = project(t, z, z + n_v(), true) < is_on;
   if (is_on_constraints)
     slope(t, z, z_dot);
   placed_.reset();
@@ -235,7 +229,7 @@ template <class Space> void RecursiveMotion<Space>::accepted(double t, const dou
   if (accepted_ == 0)
     norm_.observe(workspace_, motors_at(local().state(z)));
   if (loops_ && loops_->is_far())
-    loops_->begin_at(local().state(z), workspace_, newton_.workspace());
+    loops_->begin_at(local().state(z), workspace_, at_rest_);
   norm_.take(z, z_dot, forces_.generalized(), workspace_);
   const bool is_new = postures_.least_ratio < near || t >= postures_.watched_at + between_postures_;
   if (accepted_ == 0 || (accepted_ % steps_between_postures_ == 0 && is_new))
@@ -284,7 +278,7 @@ template <class Space> void RecursiveMotion<Space>::go_on(const MotionHistory &h
 
 template <class Space> void RecursiveMotion<Space>::linearise(double t, const double *z) {
   go_to(t);
-  newton_.linearise(local().state(z), z + n_v());
+  this->linearise_at(local().state(z), z + n_v());
 }
 
 template <class Space>

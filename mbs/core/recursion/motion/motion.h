@@ -20,8 +20,10 @@ struct MotionHistory {
   FFROBOT_FIELDS(peaks, accepted, postures);
 };
 
-template <class Space> class RecursiveMotion final : public OdeSystem {
+template <class Space> class RecursiveMotion final : public NewtonSystem<Space> {
 public:
+  using OdeSystem::local, OdeSystem::n_v;
+
   // Constraint equations that depend on others at time t and (q, v) are left out from there on; they are to be
   // consistent. Mechanism, scene and what acts beside its forces (as in SceneForces) must outlive this.
   RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t, const double *q, const double *v,
@@ -45,15 +47,7 @@ public:
   unsigned long evaluations() const override { return workspace_.evaluations; }
 
   Index constraints() const override { return value_.size(); }
-  const VectorXd &stiffness() const override { return newton_.stiffness(); }
-  const VectorXd &damping() const override { return newton_.damping(); }
-  const MatrixXd &coupling() const override { return newton_.coupling(); }
   void linearise(double t, const double *z) override;
-  void factorise(double of_damping, double of_stiffness) override { newton_.factorise(of_damping, of_stiffness); }
-  void factorise(Complex of_damping, Complex of_stiffness) override { newton_.factorise(of_damping, of_stiffness); }
-  void solve(const double *r, const double *c, double *x) override { newton_.solve(r, c, x); }
-  void solve(const Complex *r, Complex *x) override { newton_.solve(r, x); }
-  void constrain(const double *x, double *c) override { newton_.constrain(x, c); }
   void constraint_values(double t, const double *z, double *value, double *rate) override;
   double value_size(const double *z, const VectorXd &value) const override;
   double rate_size(const double *z, const VectorXd &rate) const override;
@@ -63,8 +57,8 @@ public:
   // What acts there beside gravity, elasticity and damping of modes; valid until the next call
   Forces<double> act(double t, const double *q, const double *v) { return forces_.at(t, q, v, workspace_).forces; }
   // Moves q (n_q) and v (n_v) onto the constraint equations at time t; the largest residual left, as the norm compares
-  // these
-  double project(double t, double *q, double *v);
+  // these. Where `is_next` that state is the next to be evaluated: its kinematics are kept.
+  double project(double t, double *q, double *v, bool is_next = false);
 
   // Of the scene's watch, which looks at some of the accepted steps and where it is asked to
   void watch_posture(double t, const double *q);
@@ -73,7 +67,6 @@ public:
   MotionHistory history() const { return {norm_.peaks(), accepted_, postures_}; }
   void go_on(const MotionHistory &history); // throws std::invalid_argument where it is that of another mechanism
 
-  const Workspace<Space, double> &workspace() const { return workspace_; }
   Workspace<Space, double> &workspace() { return workspace_; }
 
 private:
@@ -85,11 +78,9 @@ private:
   void evaluate_here(double t, const double *q, const double *v, double *a); // evaluate(), inline
   bool correct(double t, double *z); // moves z onto the constraint equations; false where that fails
   Placed<Space, double> residuals(double t, const double *q, const double *v, Workspace<Space, double> &w);
-  double project(double t, double *q, double *v, Workspace<Space, double> &w); // w: where residuals are measured
   const VectorXd *motors_at(const double *q); // of the last evaluation; null where they are not judged
 
-  const Mechanism<Space> &mechanism_;
-  const Scene &scene_;
+  using NewtonSystem<Space>::mechanism_, NewtonSystem<Space>::scene_, NewtonSystem<Space>::at_rest_;
   Workspace<Space, double> workspace_, measured_; // of accelerations; of residuals, which must not disturb these
   // Where workspace_ has the kinematics of the state that will be evaluated next
   std::optional<Placed<Space, double>> placed_;
@@ -103,7 +94,6 @@ private:
   std::vector<Borne> borne_;
   ConstraintLaws laws_;
   MotionNorm<Space> norm_;
-  NewtonSystem<Space> newton_;
   MotorForces<Space> *motors_ = nullptr;
   std::optional<LoopWatch<Space>> loops_; // where the scene has some
   PostureHistory postures_;

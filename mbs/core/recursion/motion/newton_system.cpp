@@ -23,8 +23,8 @@ VectorXcd product(const MatrixXd &A, const VectorXcd &x) {
 
 template <class Space>
 NewtonSystem<Space>::NewtonSystem(const Mechanism<Space> &mechanism, const Scene &scene)
-    : mechanism_(mechanism), scene_(scene), w_(mechanism), q_(VectorXd::Zero(mechanism.n_q)),
-      rest_(VectorXd::Zero(mechanism.n_v)) {
+    : OdeSystem(ConfigurationSpace(mechanism.n_v, mechanism.rotations)), mechanism_(mechanism), scene_(scene),
+      at_rest_(mechanism), q_(VectorXd::Zero(mechanism.n_q)), rest_(VectorXd::Zero(mechanism.n_v)) {
   // Elastic and damping forces of modes, springs in joints and gears
   auto coupled = scene_.cut_joints.size();
   const Index all = coupled + scene_.gears.size();
@@ -66,7 +66,7 @@ template <class Space> void NewtonSystem<Space>::find_coupling() {
   VectorXd unit = rest_, rates(scene_.cut_joints.size());
   for (Index i = 0; i < unit.size(); ++i) {
     unit[i] = 1;
-    cut_rates(place_all(q_.data(), unit.data(), nullptr, w_), scene_.cut_joints, rates.data());
+    cut_rates(place_all(q_.data(), unit.data(), nullptr, at_rest_), scene_.cut_joints, rates.data());
     coupling_.row(i).head(rates.size()) = rates.transpose();
     unit[i] = 0;
   }
@@ -87,7 +87,7 @@ template <class Space> void NewtonSystem<Space>::find_responses() {
   const VectorXd none = VectorXd::Zero(equations);
   const auto evaluate = [&](const VectorXd &force) {
     VectorXd a(rest_.size());
-    accelerations(q_.data(), rest_.data(), Forces<double>{force.data(), nullptr}, none.data(), w_, a.data());
+    accelerations(q_.data(), rest_.data(), Forces<double>{force.data(), nullptr}, none.data(), at_rest_, a.data());
     return a;
   };
   const VectorXd start = evaluate(rest_);
@@ -104,14 +104,14 @@ template <class Space> void NewtonSystem<Space>::find_responses() {
   P_ = P(free_, Eigen::all);
   R_.setZero(rest_.size(), equations);
   VectorXd unit = none;
-  for (const int r : w_.active) {
+  for (const int r : at_rest_.active) {
     unit[r] = -1;
-    response(q_.data(), unit.data(), w_, R_.col(r).data());
+    response(q_.data(), unit.data(), at_rest_, R_.col(r).data());
     unit[r] = 0;
   }
 }
 
-template <class Space> void NewtonSystem<Space>::linearise(const double *q, const double *v) {
+template <class Space> void NewtonSystem<Space>::linearise_at(const double *q, const double *v) {
   q_ = Map<const VectorXd>(q, q_.size());
   const Map<const VectorXd> v_(v, rest_.size());
   if (!scene_.cut_joints.empty())
@@ -162,10 +162,10 @@ template <class Space> void NewtonSystem<Space>::solve(const Complex *r, Complex
 }
 
 template <class Space> void NewtonSystem<Space>::constrain(const double *x, double *c) {
-  VectorXd value(R_.cols()), at_rest(R_.cols());
-  measure(q_.data(), rest_.data(), w_, value.data(), at_rest.data());
-  measure(q_.data(), x, w_, value.data(), c);
-  Map<VectorXd>(c, R_.cols()) -= at_rest; // of markers that turn
+  VectorXd value(R_.cols()), of_markers(R_.cols());
+  measure(q_.data(), rest_.data(), at_rest_, value.data(), of_markers.data());
+  measure(q_.data(), x, at_rest_, value.data(), c);
+  Map<VectorXd>(c, R_.cols()) -= of_markers; // that turn
 }
 
 template class NewtonSystem<Planar>;

@@ -8,34 +8,31 @@
 // Where E is large f is next to nothing beside r: r - E B x would be round-off of r.
 #pragma once
 
+#include "core/integrate/ode.h"
 #include "core/recursion/motion/scene.h"
 
 namespace ffrobot::recursion {
 
-template <class Space> class NewtonSystem {
+template <class Space> class NewtonSystem : public OdeSystem {
 public:
-  using Complex = std::complex<double>;
-
-  NewtonSystem(const Mechanism<Space> &mechanism, const Scene &scene); // which must outlive this
-
-  void keep(const std::vector<int> &equations) { w_.keep(equations); } // these alone
-
   // Diagonals (n_v, cut joints, gears); slopes of friction and of gears as at the last linearise()
-  const VectorXd &stiffness() const { return stiffness_; }
-  const VectorXd &damping() const { return damping_; }
-  const MatrixXd &coupling() const { return coupling_; } // (n_v, cut joints and gears), rates: coupling^T v
+  const VectorXd &stiffness() const final { return stiffness_; }
+  const VectorXd &damping() const final { return damping_; }
+  const MatrixXd &coupling() const final { return coupling_; } // (n_v, cut joints and gears), rates: coupling^T v
 
-  // As OdeSystem has these
-  void linearise(const double *q, const double *v);
-  void factorise(double damping_factor, double stiffness_factor) { factorise(damping_factor, stiffness_factor, real_); }
-  void factorise(Complex damping_factor, Complex stiffness_factor) {
-    factorise(damping_factor, stiffness_factor, complex_);
-  }
-  void solve(const double *r, const double *c, double *x);
-  void solve(const Complex *r, Complex *x);
-  void constrain(const double *x, double *c);
+  void factorise(double of_damping, double of_stiffness) final { factorise(of_damping, of_stiffness, real_); }
+  void factorise(Complex of_damping, Complex of_stiffness) final { factorise(of_damping, of_stiffness, complex_); }
+  void solve(const double *r, const double *c, double *x) final;
+  void solve(const Complex *r, Complex *x) final;
+  void constrain(const double *x, double *c) final;
 
-  Workspace<Space, double> &workspace() { return w_; } // for evaluations at rest
+protected:
+  NewtonSystem(const Mechanism<Space> &mechanism, const Scene &scene); // which must outlive this
+  void linearise_at(const double *q, const double *v);
+
+  const Mechanism<Space> &mechanism_;
+  const Scene &scene_;
+  Workspace<Space, double> at_rest_; // for evaluations at rest, of the constraint equations that are kept
 
 private:
   template <class Scalar> using Vector = Matrix<Scalar, Dynamic, 1>;
@@ -52,9 +49,6 @@ private:
   void factorise(Scalar damping_factor, Scalar stiffness_factor, Factors<Scalar> &factors) const;
   template <class Scalar> void solve(const Factors<Scalar> &factors, const Scalar *r, Map<Vector<Scalar>> x) const;
 
-  const Mechanism<Space> &mechanism_;
-  const Scene &scene_;
-  Workspace<Space, double> w_;
   VectorXd q_, rest_, stiffness_, damping_; // (n_q), (n_v) zeros
   MatrixXd coupling_;
   std::vector<Index> stiff_, free_; // of the diagonals: entries that may not be zero, ascending; others
