@@ -32,7 +32,7 @@ class _Ends(NamedTuple):
     far: float = 20.0  # times the longest way of a piece in the time of the run: what a brief piece has to move
     parts: int = 16  # of such a piece
     dense: int = 8  # times within an even interval: a hump of a quarter of it is met by two
-    hump: float = 0.02  # of the range of a function, by which it has to leave the straight line in three intervals
+    hump: float = 0.02  # of the range of a function, by which it has to leave the straight line in an interval
     few: float = 0.1  # of the intervals: a function with more humps oscillates, and steps find that
 
 
@@ -98,10 +98,10 @@ def _humps(function: TimeFunction, ends: Array) -> Array:
     values = np.nan_to_num(function.sample(times)[0])
     if ENDS.dense * np.abs(np.diff(values)).max() <= ENDS.hump * np.ptp(values):
         return times[:0]  # no interval has that much of the range
-    three = np.arange(3 * ENDS.dense + 1)
-    cells = values[np.arange(ENDS.intervals - 2)[:, None] * ENDS.dense + three]
+    off = np.abs(values - np.interp(times, times[:: ENDS.dense], values[:: ENDS.dense]))
+    three = np.arange(ENDS.intervals - 2)[:, None] * ENDS.dense + np.arange(3 * ENDS.dense + 1)
+    cells, off = values[three], off[three].max(axis=1)
     change, range_ = cells[:, -1] - cells[:, 0], np.ptp(cells, axis=1)
-    off = np.abs(cells - cells[:, :1] - change[:, None] * three / three[-1]).max(axis=1)
     steps = np.abs(np.diff(cells, axis=1)).max(axis=1)
     leaving = (off > ENDS.hump * np.ptp(values)) & (np.minimum(np.abs(change), steps) < 0.5 * range_)
     if not 0 < np.count_nonzero(leaving) < ENDS.few * ENDS.intervals:
