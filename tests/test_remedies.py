@@ -137,7 +137,7 @@ CASES = {
         falling() | {"load": [{"point": "b.tip", "y": "50*where(t > 0.2, 1, 0)"}]},
     ),
     "give values of as many joints as can move": (four_bar(s=1.2, e=-1.0, h=0.5), four_bar(s=1.2), four_bar(h=1.5)),
-    'state = "undeformed" starts from': (
+    'with state = "undeformed"': (
         falling() | {"initial": BENT | {"state": "static"}},
         falling() | {"initial": BENT | {"state": "undeformed"}},
     ),
