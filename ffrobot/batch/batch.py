@@ -12,7 +12,7 @@ import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager, nullcontext
-from multiprocessing import get_context
+from multiprocessing import connection, get_context
 from types import FrameType
 from typing import Any, NoReturn, TypeVar
 
@@ -26,6 +26,7 @@ J = TypeVar("J")
 R = TypeVar("R")
 
 TRIES = 3  # executors in a row that break before any job is done
+AGAIN = 1.0  # s, between signals to processes that have not ended
 
 
 class Batch:
@@ -92,8 +93,12 @@ class Processes(ProcessPoolExecutor):
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """End the processes, and ask runs under way to end."""
-        for process in list((self._processes or {}).values()):
-            process.terminate()
+        left = list((self._processes or {}).values())
+        while left:  # a signal that comes just before a process waits for the lock of another one, ended, is not seen
+            for process in left:
+                process.terminate()
+            connection.wait([process.sentinel for process in left], AGAIN if wait else 0.0)
+            left = [process for process in left if wait and process.is_alive()]
         super().shutdown(wait, cancel_futures=cancel_futures)
 
 
@@ -111,8 +116,9 @@ def _stop(number: int, frame: FrameType | None) -> None:
     global _is_stopping
     if not _is_busy:
         _leave()
-    _is_stopping = True
-    stop_own_worker()
+    if not _is_stopping:
+        _is_stopping = True
+        stop_own_worker()
 
 
 def _leave() -> NoReturn:
