@@ -79,7 +79,10 @@ def _pairs(model: LinearModel) -> list[tuple[str, ...]]:
 
 
 class Linear(InstantAnalysis):
-    """The robot as x' = A x + B u, y = C x + D u: `about` the static equilibrium, or an earlier analysis at `times`."""
+    """The robot as x' = A x + B u, y = C x + D u: `about` the static equilibrium, or an earlier analysis at `times`.
+
+    `points` are outputs and disturbance inputs of the model, readings of `sensor` outputs.
+    """
 
     kind: Literal["linear"]
     points: tuple[PointReference, ...] | None = None

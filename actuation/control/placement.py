@@ -174,8 +174,10 @@ def place(
 
 def _measured(measure: str, reach: Array) -> Array:
     """Values (sets,) of the reach (modes, sets)."""
-    if measure != "product":
-        return np.asarray(reach.min(axis=0) if measure == "worst" else reach.mean(axis=0))
+    if measure == "worst":
+        return np.asarray(reach.min(axis=0))
+    if measure == "mean":
+        return np.asarray(reach.mean(axis=0))
     with np.errstate(divide="ignore"):
         return np.asarray(np.exp(np.log(reach).mean(axis=0)))
 

@@ -345,7 +345,8 @@ class PythonController(ControllerRecord):
 
     kind: Literal["python"]
     python: Annotated[Any, ReadBy(_python_function, str)]
-    """The function."""
+    """Function as "FILE.py:FUNCTION" with the file next to the scene, or the function itself in scenes made in Python.
+    """
 
 
 class StateFeedback(ControllerRecord):
