@@ -130,8 +130,8 @@ def run_sweep(sweep: Sweep, batch: Batch, watcher: Watcher) -> list[Row]:
     def tabulate() -> None:
         nonlocal asked
         known = [*sweep.earlier, *(rows[k] for k in sorted(rows))]
-        if first := next((row for row in known if asked and row.status == "completed"), None):
-            for line in missing_columns(first, asked, sweep.runs[first.number].folder / RESULTS):
+        if asked and (first := next((run for run in sweep.runs if _is_completed(rows.get(run.number))), None)):
+            for line in missing_columns(rows[first.number], asked, first.folder / RESULTS):
                 warnings.warn(line, FfrobotWarning, stacklevel=1)
             asked = ()
         quantities = _quantities(known)
@@ -165,6 +165,10 @@ def run_sweep(sweep: Sweep, batch: Batch, watcher: Watcher) -> list[Row]:
         if rows:
             tabulate()
     return [rows[k] for k in sorted(rows)]
+
+
+def _is_completed(row: Row | None) -> bool:
+    return row is not None and row.status == "completed"
 
 
 def stale_rows(sweep: Sweep) -> str:
