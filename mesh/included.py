@@ -14,10 +14,12 @@ from ..common.errors import InputError
 from ..common.tables import shown
 
 _ABAQUS = re.compile(  # the keyword line goes on after a comma at its end
-    r"""^[ \t]*\*(?:[^*\n,]|,[ \t]*+(?:\r?\n)?+)*?\bINPUT[ \t]*=[ \t]*["']?([^"',\r\n]+)""",
+    r"""^[ \t]*\*(?:[^*\n,]|,[ \t]*+(?:\r?\n)?+)*?\bINP(?:UT?)?[ \t]*=[ \t]*["']?([^"',\r\n]+)""",
     re.MULTILINE | re.IGNORECASE,
 )
-_NASTRAN = re.compile(r"""^[ \t]*INCLUDE[ \t]*["']([^"']+)["']""", re.MULTILINE | re.IGNORECASE)
+_NASTRAN = re.compile(  # without quotes the name ends with the line
+    r"""^[ \t]*INCLUDE\b[ \t]*["']?((?<=["'])[^"']+|[^"'$\r\n]+)""", re.MULTILINE | re.IGNORECASE
+)
 _XDMF = re.compile(r">\s*([^<>:]+?)\s*:")
 _REFERENCES = {
     ".inp": _ABAQUS,

@@ -166,7 +166,7 @@ def test_included_files_count(read, tmp_path):
     (tmp_path / "grids.bdf").write_text(PLAIN[: PLAIN.index("CHEXA")])
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "more.bdf").write_text("$\n")
-    windows = "include 'sub\\more.bdf'\n"
+    windows = "include sub\\more.bdf $ without quotes\n"
     part = read(HEAD + "include 'gri\nds.bdf'\n" + windows + PLAIN[PLAIN.index("CHEXA") :], name="part.nas")
     assert integrate(part) == pytest.approx(VOLUME, rel=1e-6)
     assert [path.name for path in files_of(tmp_path / "part.nas")] == ["part.nas", "grids.bdf", "more.bdf"]
