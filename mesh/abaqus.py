@@ -206,11 +206,11 @@ class _Assembled:
         return [self._node(of or own, node, place) for place, members in rows for of, node, _ in members]
 
     def _masses(self) -> Iterator[PointMass]:
-        for keyword in self.deck.masses:
-            value = next((number_of(row[0], place) for row, place in keyword.rows()), 0.0)
-            name = keyword.options.get("ELSET", "").upper()
-            for own, instance in self.scopes.items():
-                sets = instance.elsets
+        for own, instance in self.scopes.items():
+            sets = instance.elsets
+            for keyword in instance.weights:
+                value = next((number_of(row[0], place) for row, place in keyword.rows()), 0.0)
+                name = keyword.options.get("ELSET", "").upper()
                 for of, number, _ in sets.numbers(name) if name in sets.members else ():
                     node = self.scopes[of or own].masses.get(number)
                     if node is not None:

@@ -180,7 +180,7 @@ _MAKING = (
 # Beside these, a keyword that is not read is named in a remark.
 _OF_THE_LINK = (
     "AMPLITUDE", "ASSEMBLY", "CONDUCTIVITY", "DAMPING", "DENSITY", "ELASTIC", "END ASSEMBLY", "END INSTANCE",
-    "END PART", "EXPANSION", "HEADING", "INITIAL CONDITIONS", "MASS", "MATERIAL", "ORIENTATION", "PART",
+    "END PART", "EXPANSION", "HEADING", "INITIAL CONDITIONS", "MATERIAL", "ORIENTATION", "PART",
     "PHYSICAL CONSTANTS", "PLASTIC", "PREPRINT", "RESTART", "SHELL SECTION", "SOLID SECTION", "SPECIFIC HEAT",
     "TRANSFORM", "BEAM SECTION", "SURFACE INTERACTION", "FRICTION", "SURFACE BEHAVIOR", "BOUNDARY",
 )  # fmt: skip
@@ -192,7 +192,8 @@ class Scope:
 
     `frame` is that of *SYSTEM, `place` where an instance is in the assembly. `nodes` are coordinates in the unit of
     the deck; elements are `solids` (type, nodes), `surfaces` (corners), `others` (types of all but solids), `masses`
-    (the node of each of type MASS). `nsets`, `elsets` are sets of nodes and elements, `faces` *SURFACE by name.
+    (the node of each of type MASS), `weights` their *MASS. `nsets`, `elsets` are sets of nodes and elements, `faces`
+    *SURFACE by name.
     """
 
     frame: Frame = GLOBAL
@@ -202,6 +203,7 @@ class Scope:
     surfaces: dict[int, tuple[int, ...]] = field(default_factory=dict)
     others: dict[int, str] = field(default_factory=dict)
     masses: dict[int, int] = field(default_factory=dict)
+    weights: list[Keyword] = field(default_factory=list)
     nsets: Sets = field(default_factory=lambda: Sets("nodes"))
     elsets: Sets = field(default_factory=lambda: Sets("elements"))
     faces: dict[str, Keyword] = field(default_factory=dict)
@@ -216,6 +218,8 @@ class Scope:
             self.elsets.read(keyword, keyword.option("ELSET"))
         elif keyword.name == "SURFACE":
             self.faces[keyword.option("NAME").upper()] = keyword
+        elif keyword.name == "MASS":
+            self.weights.append(keyword)
         else:
             own = {"NODE": self._nodes, "ELEMENT": self._elements, "SYSTEM": self._system, "NSET": self._nset}
             if keyword.name not in own:
@@ -346,7 +350,6 @@ class Deck:
         self.assembly = Scope()
         self.instances: dict[str, Scope] = {}
         self.ties: list[Keyword] = []
-        self.masses: list[Keyword] = []
         self.not_read: Counter[str] = Counter()
         self.unused: set[str] = set()  # parts
         scope, in_step = self.assembly, False
@@ -366,7 +369,6 @@ class Deck:
             elif keyword.name == "TIE":
                 self.ties.append(keyword)
             elif not scope.read(keyword):
-                self.masses += [keyword] if keyword.name == "MASS" else []
                 self.not_read[keyword.name] += keyword.name not in _OF_THE_LINK
         if scope is not self.assembly:
             raise InputError("expected *END PART or *END INSTANCE", "the end of the file: it is cut off")

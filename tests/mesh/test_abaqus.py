@@ -178,6 +178,14 @@ def test_sets_of_whole_instances(read, tmp_path):
     assert len(read_abaqus(tmp_path / "part.inp").point_groups["LOW_NODES"]) == len(HALF)
 
 
+def test_masses_of_parts_whose_sets_have_one_name(read, tmp_path):
+    mass = "*ELEMENT, TYPE=MASS, ELSET=M\n99, 1\n*MASS, ELSET=M\n{}.\n"
+    other = PART.partition("*Assembly")[0].replace("HALF", "OTHER").format(mass.format(7))
+    text = other + PART.format(mass.format(5)) + "*Instance, name=O, part=OTHER\n*End Instance\n" + SECOND
+    read(text + SURFACES.replace("H-1", "O") + "*Tie, name=g\nDOWN, UP\n")
+    assert [one.mass for one in read_abaqus(tmp_path / "part.inp").masses] == [7, 5]
+
+
 def test_nodes_of_a_set_of_elements(read):
     """The two elements at the tip have the nodes of x = 2/3 and 1."""
     text = PLAIN + "*ELSET, ELSET=TIP\n5, 6\n*NSET, NSET=END, ELSET=TIP\n"
@@ -227,7 +235,7 @@ def test_included_files_count(read, tmp_path):
     (tmp_path / "part.inp").write_text("*INCLUDE, INPUT=sub/mesh.txt\n")
     assert [path.name for path in files_of(tmp_path / "part.inp")] == ["part.inp", "mesh.txt", "cells.txt"]
     assert integrate(read("*INCLUDE, INPUT=sub\\mesh.txt\n")) == pytest.approx(VOLUME, rel=1e-9)  # Windows'
-    (tmp_path / "part.inp").write_text("*INCLUDE, INPUT=sub\\mesh.txt\n", encoding="utf-16")
+    (tmp_path / "part.inp").write_text("*INCLUDE, INP=sub\\mesh.txt\n", encoding="utf-16")
     assert len(files_of(tmp_path / "part.inp")) == 3
     (tmp_path / "rows.txt").write_text(nodes(POINTS).partition("\n")[2])
     assert integrate(read("*NODE, INPUT=rows.txt\n" + elements(CELLS))) == pytest.approx(VOLUME, rel=1e-9)
