@@ -16,12 +16,12 @@ from ...common.errors import InputError, SolveError
 from ...common.libraries import scipy
 from ...common.rotations import skew
 from ...common.structs import struct
+from ..model.gears import gear_matrices
 from ..model.known_motion import KnownStates, required_forces
 from ..model.model import Model
 from ..model.nodes import Node
 from ..model.system import FrameShare, MultibodySystem, frame_share, turning_motors
 from ..scene.space import SPACES
-from .vibration import gear_matrices
 
 DEPENDENT = 1e-8  # of a row's gradient, what others must leave of it to count as independent
 

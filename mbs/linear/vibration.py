@@ -10,10 +10,9 @@ import numpy as np
 from ...common.arrays import Array, null_space
 from ...common.errors import InputError, quoted
 from ...common.structs import struct
-from ..model.gears import friction_damping, with_prescribed_motors
+from ..model.gears import friction_damping, gear_matrices, with_prescribed_motors
 from ..model.known_motion import State, mass_matrices
 from ..model.model import Model
-from ..model.tree import KinematicTree
 from ..posture.redundancy import resolved
 from ..posture.start import relaxed_gears, undeformed_posture
 
@@ -43,24 +42,14 @@ def vibrations_of(model: Model, t: float, q: Array) -> Vibrations:
     M = mass_matrices(model, q[None], t)[0] * both
     (C_v,) = model.constraints.natural_gradients(q[None], np.array([t]), sizes)
     K, D = gear_matrices(model.tree, q)
+    D += friction_damping(model, q)
     for node in model.tree.nodes:
         K[node.p_v, node.p_v] = np.diag(node.body.stiffness)
-        D[node.p_v, node.p_v] = node.body.damping
+        D[node.p_v, node.p_v] += node.body.damping
     squares, shape = elastic_shapes((M + M.T) / 2, K * both, C_v)
     omega, shape = np.sqrt(squares), sizes[:, None] * shape
-    ratio = np.einsum("in,ij,jn->n", shape, D + friction_damping(model, q), shape) / (2 * omega)
+    ratio = np.einsum("in,ij,jn->n", shape, D, shape) / (2 * omega)
     return Vibrations(omega, ratio, shape, K)
-
-
-def gear_matrices(tree: KinematicTree, q: Array) -> tuple[Array, Array]:
-    """Return K (N·m/rad, N/m) and D (N·m·s/rad, N·s/m), (n_v, n_v), of compliant gears at q (n_q,)."""
-    K, D = np.zeros((2, tree.n_v, tree.n_v))
-    for gear in tree.gears:
-        twist = np.zeros(tree.n_v)
-        twist[gear.motor.v.start], twist[gear.joint.v.start] = 1.0, -gear.sign
-        K += gear.spring.slope(gear.twist(q, np.zeros(tree.n_v))[0]) * np.outer(twist, twist)
-        D += gear.damping * np.outer(twist, twist)
-    return K, D
 
 
 def elastic_shapes(M: Array, K: Array, C_v: Array) -> tuple[Array, Array]:

@@ -113,6 +113,17 @@ def compliance(node: Node) -> tuple[TwistSpring, float] | None:
     return TwistSpring.of(joint.stiffness), joint.damping
 
 
+def gear_matrices(tree: KinematicTree, q: Array) -> tuple[Array, Array]:
+    """Return K (N·m/rad, N/m) and D (N·m·s/rad, N·s/m), (n_v, n_v), of compliant gears at q (n_q,)."""
+    K, D = np.zeros((2, tree.n_v, tree.n_v))
+    for gear in tree.gears:
+        twist = np.zeros(tree.n_v)
+        twist[gear.motor.v.start], twist[gear.joint.v.start] = 1.0, -gear.sign
+        K += gear.spring.slope(gear.twist(q, np.zeros(tree.n_v))[0]) * np.outer(twist, twist)
+        D += gear.damping * np.outer(twist, twist)
+    return K, D
+
+
 def resistance(model: Model, q: Array, v: Array) -> Array:
     """Return negative forces (T, n_v) of friction in all joints, cut ones too, SI, at q (T, n_q) and v (T, n_v)."""
     force = model.along_cut.resistance(q, v)

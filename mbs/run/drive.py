@@ -14,9 +14,7 @@ from ...common.structs import struct
 from .. import _core
 from .._core import TimeFunction
 from ..fields.waypoints import spline
-from ..linear.vibration import gear_matrices
 from ..model.drives import NO_DRIVES, Command, Drives, PointDrive
-from ..model.gears import friction_damping
 from ..model.known_motion import State
 from ..model.model import Model
 from ..model.system import MultibodySystem, integrated_mechanism, zero_order_hold
@@ -37,12 +35,12 @@ from .integrators import (
     EXPLICIT,
     METHODS,
     REPEATED,
-    TOO_STIFF,
     Choice,
     Contender,
+    Stiffness,
     beyond_round_off,
     choose_integrator,
-    fastest,
+    stiffness_of,
     unmet,
 )
 from .record import Continuation, Run, Statistics
@@ -121,6 +119,7 @@ class _Integration:
     """What moves in an integration, what acts on it, the times at which it is told, and how far it has come."""
 
     integrator: Choice
+    stiffness: Stiffness  # at the start
     continuation: Continuation
     loop_rank: int | None  # of loops whose postures the core cannot watch
 
@@ -136,6 +135,7 @@ class _Integration:
     def begin(self, start: State, earlier: Run | None, undeformed: Array | None, *, is_recorded: bool) -> None:
         """Choose the integrator, go on from an `earlier` run, and have the core watch limits and postures."""
         analysis, times, is_sampled, continuation = self.analysis, self.times, self.control is not None, None
+        self.stiffness = stiffness_of(self.system, start)
         if (steps := analysis.repeat_steps) is not None:
             if steps.ends[-1] != times[-1]:
                 raise InputError(
@@ -145,7 +145,9 @@ class _Integration:
                 )
             self.integrator = Choice(steps.method, REPEATED)
         else:
-            self.integrator = choose_integrator(self.system, analysis, start, times, is_sampled=is_sampled)
+            self.integrator = choose_integrator(
+                self.system, analysis, start, times, self.stiffness, is_sampled=is_sampled
+            )
             if analysis.keep_steps and self.integrator.name in EXPLICIT:
                 self.integrator = self.integrator._replace(candidates=())
         if earlier is not None:  # with the same candidates, and what they have become since
@@ -245,7 +247,7 @@ class _Integration:
             advice = out_of_reach(motion.model, self.times) or "move the path, or start in another posture"
             status, cause = "diverged", f"{posture}: {advice}"
         elif status not in ("completed", "interrupted"):
-            cause = find_cause(self.system, self.analysis, self.integrator, run)
+            cause = find_cause(self.system, self.analysis, self.integrator, self.stiffness, run)
         of_gears = max((gear.round_off(motion.q) for gear in motion.model.tree.gears), default=0.0)
         texts = [posture, beyond_round_off(self.analysis.tolerance, run, of_gears)]
         texts += left_ranges(motion.model, run.ranges, motion.time, motion.q, motion.v)
@@ -382,11 +384,13 @@ def _ends_in_posture(run: _core.TreeRun) -> bool:
 FAR_BENT = 0.5  # of a link's radius of gyration, in the mean
 
 
-def find_cause(system: MultibodySystem, analysis: IntegratedAnalysis, choice: Choice, run: _core.TreeRun) -> str:
+def find_cause(
+    system: MultibodySystem, analysis: IntegratedAnalysis, choice: Choice, stiffness: Stiffness, run: _core.TreeRun
+) -> str:
     """A sentence with the likely cause of a failed `run`, and advice; "" where none is found.
 
-    Looked for, in this order: a target that is not a number, a link bent too far, a load that jumps, friction,
-    gears, a singular posture of loops; where steps became too short, the integrator.
+    Looked for, in this order: a target that is not a number, a link bent too far, a load that jumps, a singular
+    posture of loops, friction, gears; where steps became too short, the integrator.
     """
     t, at = run.time_reached, State(*np.split(np.array(run.last), [system.model.tree.n_q]))
 
@@ -397,8 +401,8 @@ def find_cause(system: MultibodySystem, analysis: IntegratedAnalysis, choice: Ch
         not_a_number(_targets(system), accelerations, t)
         or _too_far_bent(system, at)
         or load_jump(_loads(system), t)
-        or _too_stiff(system, analysis, choice, at)
         or describe_loops(system.model, t, at.q, at.v)
+        or stiffness.describe(analysis.end, choice.name)
     )
     if causes or run.status != _core.IntegrationStatus.step_underflow:
         return causes
@@ -459,22 +463,4 @@ def load_jump(loads: Iterable[tuple[str, TimeFunction]], t: float) -> str:
         change = abs(after - before) - abs(before - first) - abs(last - after)
         if change > JUMP * max(abs(before), abs(after)):
             return f"{label} jumps from {before:.6g} to {after:.6g} there: round it off, or loosen the tolerance"
-    return ""
-
-
-def _too_stiff(system: MultibodySystem, analysis: IntegratedAnalysis, choice: Choice, at: State) -> str:
-    model, most = system.model, TOO_STIFF / analysis.end
-    rate, joint = fastest(system, at, friction_damping(model, at.q, is_at_rest=True))
-    if rate > most:
-        implicit = 'integrator = "radau", ' if choice.name in EXPLICIT else ""
-        return (
-            f"friction of {joint} brings it to rest within {1 / rate:.1e} s, which steps of {choice.name} cannot"
-            f" follow: use {implicit}less friction or a larger friction_speed"
-        )
-    square, rate = (fastest(system, at, of)[0] for of in gear_matrices(model.tree, at.q))
-    if square > max(most, rate / 2) ** 2:
-        return (
-            f"compliant gears vibrate at {np.sqrt(square):.2g} rad/s, too fast for the run: give them damping or no"
-            " stiffness"
-        )
     return ""

@@ -14,7 +14,7 @@ import numpy as np
 from ...common.arrays import Array
 from .. import _core
 from ..linear.vibration import Vibrations, vibrations_of
-from ..model.gears import friction_damping
+from ..model.gears import friction_damping, gear_matrices
 from ..model.known_motion import State
 from ..model.model import Model
 from ..model.system import MultibodySystem
@@ -219,9 +219,15 @@ def integrator_of(model: Model, name: str) -> str:
 
 
 def choose_integrator(
-    system: MultibodySystem, analysis: IntegratedAnalysis, start: State, times: Array, *, is_sampled: bool
+    system: MultibodySystem,
+    analysis: IntegratedAnalysis,
+    start: State,
+    times: Array,
+    stiffness: Stiffness,
+    *,
+    is_sampled: bool,
 ) -> Choice:
-    """The integrator for an analysis from `start` with outputs at `times` (T,), s.
+    """The integrator for an analysis from `start`, of this `stiffness`, with outputs at `times` (T,), s.
 
     With a controller (`is_sampled`) steps start anew at each sample, and no other integrator takes over.
     """
@@ -232,8 +238,7 @@ def choose_integrator(
         return Choice("dop853", "nothing to integrate")
     if _sticks(model):
         return Choice("radau", "dry friction is a stiff damper to the light ends of links")
-    rate, _ = fastest(system, start, friction_damping(model, start.q, is_at_rest=True))
-    if rate * float(np.ptp(times)) > TOO_STIFF:
+    if (rate := stiffness.friction) * float(np.ptp(times)) > TOO_STIFF:
         return Choice("radau", f"friction is a stiff damper: joints come to rest within {1 / rate:.1e} s")
     if not model.tree.gears and not any(node.body.n_modes for node in model.tree.nodes):
         return Choice("dop853", "nothing vibrates")
@@ -258,19 +263,50 @@ def choose_integrator(
     return choice if replayed is None else choice._replace(candidates=())
 
 
-def fastest(system: MultibodySystem, at: State, D: Array) -> tuple[float, str]:
-    """Largest eigenvalue of M⁻¹ D (n_v, n_v) under the constraints in the state `at`, and its joint's label.
+class Stiffness(NamedTuple):
+    """How fast friction and compliant gears are in a state.
 
-    Of slopes D of friction: the largest rate (1/s) at which a joint comes to rest.
+    Attributes:
+        friction: largest rate at which friction brings a joint to rest, 1/s.
+        joint: label of this joint.
+        gears: highest frequency of the gears without damping, rad/s.
+        damping: largest rate of their damping, 1/s.
     """
-    if not D.any():
-        return 0.0, ""
-    by_forces = system.core.derivatives(system.scene, 0.0, at.q, at.v, np.zeros(len(D))).a_f
-    rates, shapes = np.linalg.eig(by_forces @ D)
+
+    friction: float
+    joint: str
+    gears: float
+    damping: float
+
+    def describe(self, duration: float, integrator: str) -> str:
+        """A sentence with advice where friction or gears are too fast for steps of the integrator; else ""."""
+        if self.friction * duration > TOO_STIFF:
+            implicit = 'integrator = "radau", ' if integrator in EXPLICIT else ""
+            return (
+                f"friction of {self.joint} brings it to rest within {1 / self.friction:.1e} s, which steps of"
+                f" {integrator} cannot follow: use {implicit}less friction or a larger friction_speed"
+            )
+        if self.gears > max(TOO_STIFF / duration, self.damping / 2):
+            return (
+                f"compliant gears vibrate at {self.gears:.2g} rad/s, too fast for the run: give them damping or no"
+                " stiffness"
+            )
+        return ""
+
+
+def stiffness_of(system: MultibodySystem, at: State) -> Stiffness:
+    """Friction, dry one at rest, and gears in the state `at`, under the constraints."""
+    model = system.model
+    friction, (K, D) = friction_damping(model, at.q, is_at_rest=True), gear_matrices(model.tree, at.q)
+    if not (friction.any() or K.any()):
+        return Stiffness(0.0, "", 0.0, 0.0)
+    by_forces = system.core.derivatives(system.scene, 0.0, at.q, at.v, np.zeros(model.tree.n_v)).a_f
+    rates, shapes = np.linalg.eig(by_forces @ friction)
     k = int(np.argmax(rates.real))
     share = np.abs(shapes[:, k])
-    joint = max(system.model.tree.nodes, key=lambda node: share[node.v].max(initial=0.0)).joint
-    return float(rates[k].real), joint.label
+    joint = max(model.tree.nodes, key=lambda node: share[node.v].max(initial=0.0)).joint
+    square, damping = (float(np.linalg.eigvals(by_forces @ of).real.max()) for of in (K, D))
+    return Stiffness(float(rates[k].real), joint.label, square**0.5, damping)
 
 
 def _sticks(model: Model) -> bool:

@@ -11,13 +11,12 @@ from prescribed_oracle import residuals
 from tree_oracle import row_values
 
 from ffrobot.mbs import _core
-from ffrobot.mbs.model.gears import friction_damping
 from ffrobot.mbs.model.known_motion import State
 from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.quantities.motion import joint_motion
 from ffrobot.mbs.quantities.reactions import reactions
 from ffrobot.mbs.quantities.supply import totals
-from ffrobot.mbs.run.integrators import fastest
+from ffrobot.mbs.run.integrators import stiffness_of
 
 CHAINS = [
     (("revolute", "universal", "cylindrical", "universal"), ("rigid",)),
@@ -150,8 +149,7 @@ def test_a_joint_that_sticks_where_the_loop_is_cut():
     for cut in chain.tables:
         model = chain.model(cut)
         system, q = MultibodySystem(model), chain.position(model)
-        D = friction_damping(model, q, is_at_rest=True)
-        rates.append(fastest(system, State(q, np.zeros(model.tree.n_v)), D)[0])
+        rates.append(stiffness_of(system, State(q, np.zeros(model.tree.n_v))).friction)
         implicit, explicit = (swung(system, q, method) for method in ("radau", "dop853"))
         assert implicit.status == _core.IntegrationStatus.completed != explicit.status
         end = implicit.states[-1:]
