@@ -39,6 +39,7 @@ class _Ends(NamedTuple):
 ENDS = _Ends()
 
 
+@np.errstate(over="ignore", invalid="ignore")  # infinite loads end runs and are named as the cause
 def stops(
     times: Array, paths: Iterable[Trajectory], loads: Iterable[TimeFunction], *, is_driven: bool, is_replay: bool
 ) -> Array:
