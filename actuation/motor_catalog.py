@@ -11,7 +11,7 @@ from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.keys import NotNegative, Positive
 from ..common.peaks import root_mean_square
-from ..common.toml_files import load_toml, read_csv
+from ..common.toml_files import load_toml, read_labelled_csv
 from ..common.validation import Record, validate
 
 
@@ -80,20 +80,12 @@ def read_catalog(path: Path) -> tuple[CatalogMotor, ...]:
     """
     if path.suffix.lower() == ".toml":
         return validate(_Catalog, load_toml(path, "catalog of motors"), path).motor
-    header, rows = read_csv(path, "catalog of motors")
-    if not rows or len(set(header)) < len(header):
-        expected = "a line of different columns (name, rated_torque, …) and motors below"
-        raise InputError(f"{path}: expected {expected}", ", ".join(header) or "none")
-    for number, row in rows:
-        if len(row) != len(header):
-            raise InputError(
-                f"{path}: line {number}: expected {len(header)} cells with commas, semicolons or tabs between them, as"
-                " the header has",
-                len(row),
-            )
+    _, rows = read_labelled_csv(path, "catalog of motors")
+    if not rows:
+        raise InputError(f"{path}: expected a line of columns (name, rated_torque, …) and motors below", "none")
     motors = []
     for _, row in rows:
-        given: dict[str, Any] = {key: text for key, text in zip(header, row, strict=True) if text}
+        given: dict[str, Any] = {key: text for key, text in row.items() if text}
         if "gear_ratio" in given:
             given["gear_ratio"] = tuple(given["gear_ratio"].split())
         motors.append({key: text if key == "name" else _numbers(text) for key, text in given.items()})

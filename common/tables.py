@@ -25,7 +25,7 @@ def parse_csv(text: str) -> CsvTable:
     """Header and cells of CSV text, between commas, semicolons or tabs, as the header has them.
 
     With the latter two, numbers may have decimal commas. Empty lines and comments (#) are skipped, but for a header
-    that is a comment, as NumPy writes it. Raises `csv.Error`.
+    that is a comment, as NumPy writes it. Raises `csv.Error`, also where a column stands twice.
     """
     lines = [(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("sep=")]
     comments = [(k, line.lstrip("# ")) for k, line in lines if line.startswith("#")]
@@ -45,6 +45,9 @@ def parse_csv(text: str) -> CsvTable:
     is_table = len(header[1]) > 1 and all(map(NAME.fullmatch, header[1]))
     if header[1] and not (is_table or any(_is_number(cell) for _, row in below for cell in row)):
         raise csv.Error("expected names of columns and numbers below, found other text")  # which is not for messages
+    names = [name for name in header[1] if name]
+    if is_table and len(set(names)) < len(names):
+        raise csv.Error(f"line {header[0]}: expected each column once, found {shown(','.join(header[1]))!r}")
     return header[1], below
 
 

@@ -41,6 +41,22 @@ def read_csv(path: Path, kind: str) -> CsvTable:
         raise InputError(f"{path}: cannot read the {kind}: {error}") from None
 
 
+def read_labelled_csv(path: Path, kind: str) -> tuple[list[str], list[tuple[int, dict[str, str]]]]:
+    """Read the CSV file at `path` as `read_csv`: its header, and the cells of each line by column.
+
+    Raises `InputError`, also for a line with more or fewer cells than columns.
+    """
+    header, rows = read_csv(path, kind)
+    for line, row in rows:
+        if len(row) != len(header):
+            raise InputError(
+                f"{path}: line {line}: expected {len(header)} cells with commas, semicolons or tabs between them, as"
+                " the header has",
+                len(row),
+            )
+    return header, [(line, dict(zip(header, row, strict=True))) for line, row in rows]
+
+
 def read_bytes(path: Path, kind: str) -> bytes:
     """Read the bytes of the file at `path`. Raises `InputError`, whose message calls the file `kind`."""
     check_regular(path)

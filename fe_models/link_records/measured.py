@@ -7,7 +7,7 @@ from pathlib import Path
 from ...common.errors import InputError, check_known, quoted
 from ...common.structs import struct
 from ...common.tables import LARGEST, shown
-from ...common.toml_files import read_csv
+from ...common.toml_files import read_labelled_csv
 from ...common.validation import InputFile, Record
 
 COLUMNS = ("mode", "family", "frequency", "damping_ratio", "uncertainty")
@@ -43,13 +43,13 @@ def read_measured(path: Path, families: tuple[str, ...]) -> list[MeasuredMode]:
 
     Raises `InputError` naming file and line.
     """
-    header, table = read_csv(path, "table of measured modes")
+    header, table = read_labelled_csv(path, "table of measured modes")
     for name in header:
         check_known(name, COLUMNS, f"{path}: line 1: expected columns among {quoted(COLUMNS)}")
-    if len(set(header)) < len(header) or "mode" not in header or not {"frequency", "damping_ratio"} & set(header):
+    if "mode" not in header or not {"frequency", "damping_ratio"} & set(header):
         columns = shown(",".join(header))
         raise InputError(f"{path}: line 1: expected a header such as mode,frequency,damping_ratio", f"{columns!r}")
-    rows = [_row(path, line, header, row, families) for line, row in table]
+    rows = [_row(f"{path}: line {line}", line, cells, families) for line, cells in table]
     if not rows:
         raise InputError(f"{path}: expected at least one measured mode below the header", "none")
     seen = set[tuple[str, int]]()
@@ -60,11 +60,7 @@ def read_measured(path: Path, families: tuple[str, ...]) -> list[MeasuredMode]:
     return rows
 
 
-def _row(path: Path, line: int, header: list[str], row: list[str], families: tuple[str, ...]) -> MeasuredMode:
-    where = f"{path}: line {line}"
-    if len(row) != len(header):
-        raise InputError(f"{where}: expected as many entries as the header has", "more or fewer")
-    texts = dict(zip(header, row, strict=True))
+def _row(where: str, line: int, texts: dict[str, str], families: tuple[str, ...]) -> MeasuredMode:
     number = texts["mode"]
     if not (number.isascii() and number.isdecimal() and int(number[:9]) > 0):
         raise InputError(f"{where}: mode: expected a whole number from 1 on", f'"{shown(number)}"')

@@ -18,7 +18,7 @@ from ..common.libraries import extras, scipy
 from ..common.rotations import of_rpy
 from ..common.structs import struct
 from ..common.tables import shown
-from ..common.toml_files import load_toml, read_bytes, read_csv
+from ..common.toml_files import load_toml, read_bytes, read_labelled_csv
 from ..common.validation import InputFile, Record, validate
 from ..mbs.fields.field_types import NotNegative, PointReference, Positive
 from ..mbs.joints.joint import Angles
@@ -92,19 +92,15 @@ def _axis(path: Path, code: float) -> str:
 
 def _of_csv(path: Path) -> Iterator[Column]:
     """FRFs of a table with a line for each frequency of each function."""
-    header, table = read_csv(path, "table of FRFs")
-    for k, name in enumerate(header):
-        others = [one for one in COLUMNS if one not in header[:k]]
-        check_known(name, others, f"{path}: line 1: expected columns among {quoted(COLUMNS)}, each once")
+    header, table = read_labelled_csv(path, "table of FRFs")
+    for name in header:
+        check_known(name, COLUMNS, f"{path}: line 1: expected columns among {quoted(COLUMNS)}")
     if missing := [name for name in COLUMNS[:-1] if name not in header]:
         raise InputError(f"{path}: line 1: expected the columns {quoted(COLUMNS[:-1])}", f"no {quoted(missing)}")
     if not table:
         raise InputError(f"{path}: expected a line for each frequency of each function below line 1", "none")
     functions: dict[tuple[str, ...], list[list[float]]] = {}
-    for line, row in table:
-        if len(row) != len(header):
-            raise InputError(f"{path}: line {line}: expected {len(header)} cells", len(row))
-        cells = dict(zip(header, row, strict=True))
+    for line, cells in table:
         numbers = []
         for cell in (cells[name] for name in COLUMNS if name in cells and name not in ENDS):
             try:

@@ -293,7 +293,7 @@ def _read_table(path: Path) -> tuple[list[str], Array, Indices]:
         header, rows = header[1:], [(line, row[1:]) for line, row in rows]
     if header and header[0].startswith(("{", "[")):
         raise InputError(f"{path}: expected a table", f"JSON: ffrobot import {path.name} -o path.csv makes one of it")
-    if len(header) < 2 or TIME.fullmatch(header[0]) is None or not all(header) or len(set(header)) < len(header):
+    if len(header) < 2 or TIME.fullmatch(header[0]) is None or not all(header):
         raise InputError(f"{path}: line 1: expected a header such as t,x,y or t,value", f"{','.join(header)!r}")
     if len(rows) < 2:
         raise InputError(f"{path}: expected at least 2 waypoints", len(rows))

@@ -87,11 +87,12 @@ def test_a_new_table_needs_no_new_modes(measured_link, computed):
 TABLES = {
     "mode,frequncy\n1,30\n": 'line 1: expected columns among "mode"',
     "mode,frequency\n1,-30\n": 'line 2: frequency: expected a number above 0, in Hz, or nothing, found "-30"',
+    "mode,mode\n1,1\n": "line 1: expected each column once, found 'mode,mode'",
     "mode,frequency\n0,30\n": 'line 2: mode: expected a whole number from 1 on, found "0"',
     "mode,frequency\n1,30\n1,31\n": "line 3: expected each mode once, found mode 1 again",
     "mode,frequency,damping_ratio\n1,,\n": "line 2: expected a frequency or a damping_ratio, found neither",
     "mode,frequency,damping_ratio\n1,30,-0.1\n": "line 2: damping_ratio: expected a number not below 0",
-    "mode,frequency\n1\n": "line 2: expected as many entries as the header has",
+    "mode,frequency\n1\n": "line 2: expected 2 cells with commas, semicolons or tabs between them, as the header has",
     "mode,family,frequency\n1,in-plane,30\n": 'family: expected "in-plane-bending", ',
 }
 
