@@ -12,11 +12,12 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError, SolveError
 from ...common.libraries import scipy
+from ...common.structs import struct
 from ...mbs._core import TimeFunction
 from ...mbs.analysis.forward import actuator_commands, command_ranges, largest_moments, strain_directions
 from ...mbs.linear.linearisation import LinearEquations
 from ...mbs.linear.statics import initial_state
-from ...mbs.model.amplifiers import joined
+from ...mbs.model.amplifiers import Amplifiers, joined
 from ...mbs.model.drives import Drives, PointDrive
 from ...mbs.model.gears import with_compliance
 from ...mbs.model.known_motion import State
@@ -29,12 +30,11 @@ from ...mbs.run.gears import MotorCoordinates, with_motor_coordinates
 from ...mbs.run.record import Run
 from ...mbs.run.replay import replay_times, supplied
 from ..context import ActuatedContext
-from ..patches.link_patches import LinkPatches
 from .controllers import ComputedTorqueControl, Controller, PythonControl, make_controllers
 from .linear import with_voltages
 from .linear_model import LinearModel, state_space
 from .loop import AmplifiedLoop, Loop, between, held_commands, loop_record, times_of_run
-from .margins import MOST, Feedback, eigenvalue_count, lowest_frequency
+from .margins import MOST, Feedback, Loops, eigenvalue_count, lowest_frequency
 from .metrics import LoopMotion, last_change
 from .observer import Observed, make_observed
 from .records import SampledAnalysis
@@ -43,6 +43,23 @@ from .signals import Filter, Sensing, Signal, filters, make_signals, merged, rea
 
 APART = 1e-6  # of a run, between two times of a spline
 INSTANT = 1e-6  # of the sample time, before and after which commands are read where they change
+
+
+@struct
+class LoopTask:
+    """What a closed loop is to do: the robot, the motion that it follows, signals of both, and limits. SI units."""
+
+    analysis: SampledAnalysis
+    context: ActuatedContext
+    source: Run  # the inverse analysis
+    plant: Model  # the robot without paths, with compliant gears
+    moved: MotorCoordinates  # motion of the source in coordinates of the plant
+    robot: ControlledRobot
+    sensing: Sensing  # of sensors, those that controllers need included
+    ideal: Sensing  # of what an observer estimates
+    tip: str  # "BODY.POINT" of the plant
+    amplifiers: Amplifiers
+    ranges: Array  # (2, inputs) limits of commands, N·m, N or V
 
 
 class ClosedLoop(SampledAnalysis):
@@ -62,100 +79,32 @@ class ClosedLoop(SampledAnalysis):
         The run's details are a `LoopRecord`. A run that diverges ends there and is kept. Raises `InputError` for
         controllers that do not fit the robot, `SolveError` where a user's function fails.
         """
-        assert self.actuation is not None
-        source = context.outcomes[self.actuation]
-        plant = with_compliance(context.model.without_paths())
-        moved, robot, whole = with_motor_coordinates(source, plant), whole_robot(context, source), context.whole
-        read, estimated = self._signals(context, plant, robot)
-        sensing, ideal = Sensing(plant, read), Sensing(plant, estimated)
-        outputs, tip = replay_times(source, self), place_of(whole, self.tip) or default_tip(plant)
-        models = loop_models(plant, source.time, moved, context.patches, read)
-        place_at = _place_of_tip(self, plant, source, tip)
+        task = _task(self, context)
+        outputs, place_at = replay_times(task.source, self), _place_of_tip(task)
+        models = loop_models(task)
         lowest = lowest_frequency(models, self.controller, self.sample_time, self.delay)
         times, rows = times_of_run(outputs, place_at, lowest)
-        count = int(np.ceil(np.ptp(outputs) / self.sample_time * (1 - 1e-12)))
-        samples = outputs[0] + np.arange(count) * self.sample_time  # before the last output
-        seen = source if moved.gears else _resolved(source)  # gears that give are known at outputs
-        of_seen = moved if moved.gears else with_motor_coordinates(seen, plant)
-        reference, wanted = (
-            between(samples, seen.time, of.read(of_seen.q, of_seen.v, of_seen.a)) for of in (sensing, ideal)
-        )
-        filtered = Filter(read, self.sample_time)
-        reference[:] = [filtered(y) for y in reference]
-        setup = Setup(
-            robot=robot,
-            model=robot.model,
-            patches=context.patches,
-            inputs=input_names(robot),
-            outputs=tuple(signal.name for signal in read),
-            times=samples,
-            sample_time=self.sample_time,
-            delay=self.delay,
-            reference=reference,
-            feed_forward=_feed_forward(context, self, source, moved, samples),
-            source=robot.source,
-        )
-        amplifiers, ranges = joined(context.patches.values()), command_ranges(context.model, context.patches)
-        if self.unlimited:
-            amplifiers, ranges = amplifiers.unlimited(), np.inf * np.sign(ranges)
-        observed = None
-        if self.observer is None:
-            acting = make_controllers(self.controller, setup)
-        else:
-            nominal = _feed_forward(context, self, source, moved, samples, whole=True)
-            observed = make_observed(self, context, setup, wanted, ranges, nominal)
-            acting = [observed]
+        setup, wanted = _setup(task, outputs)
+        acting = _controllers(task, setup, wanted)
+        observed = next((one for one in acting if isinstance(one, Observed)), None)
         begun = [of if isinstance(of, PythonControl) else copy(of) for of in acting]
-        loop = Loop(setup, read, acting, ranges, self.seed)
-        splits = n_q, rates = plant.tree.n_q, plant.tree.n_q + plant.tree.n_v
-        states: list[Array] = []
-
-        def at_sample(k: int, t: float, state: Array) -> Array:
-            q, v, a = (part[None] for part in (state[:n_q], state[n_q:rates], state[rates:]))
-            if observed is not None:
-                states.append(state.copy())
-            return loop(k, t, sensing.read(q, v, a)[0])
-
-        arriving: Loop | AmplifiedLoop = loop
-        if amplifiers.acts:
-            directions = strain_directions(plant, context.patches)
-            arriving = AmplifiedLoop(
-                loop, at_sample, samples, self.sample_time, amplifiers=amplifiers, directions=directions, splits=splits
-            )
-            samples, at_sample = arriving.times, arriving
-        instant, inputs = INSTANT * self.sample_time, actuator_commands(plant, context.patches)
-        held = partial(held_commands, samples=samples, delay=self.delay, loop=arriving, after=instant)
-        before = partial(held, after=-instant)
-        control = Control(
-            commands=inputs,
-            first=arriving.first,
-            times=samples,
-            delay=self.delay,
-            controller=at_sample,
-            held=before,
-            instant=instant,
-        )
-        disturbing = ((place_of(whole, str(load.point)), load.components) for load in self.disturbance)
+        loop = Loop(setup, task.sensing.signals, acting, task.ranges, self.seed)
+        states: list[Array] | None = None if observed is None else []
+        control, held = _control(task, loop, setup.times, states)
+        disturbing = ((place_of(context.whole, str(load.point)), load.components) for load in self.disturbance)
         drives = Drives(at_points=tuple(PointDrive(*load) for load in disturbing))
-        run = drive_robot(
-            plant, self, _start(context, self, plant, moved), context.progress, drives=drives, times=times,
-            control=control,
-        )  # fmt: skip
+        run = drive_robot(task.plant, self, _start(task), context.progress, drives=drives, times=times, control=control)
         closer, run = run.closer, run.at([k for k in rows if k < len(run.time)])
-        quiet = _last_change(plant, self, outputs)
-        motion = _followed(closer, place_at, held, tip, quiet)
+        motion = _followed(task, closer, place_at, held, _last_change(task, outputs))
         readings = loop.readings if observed is None else np.hstack([loop.readings, observed.estimates])
-        found, along = loops_about(setup, begun, readings[: loop.taken], models)
-        filtering = filters(read, self.sample_time)
-        # not of slower sensors, whose loops are not the same from sample to sample
-        every = ((model, feedback.behind(*filtering)) for model, feedback in found if not loop.is_slow)
-        loops = [one for one in every if eigenvalue_count(one, self.sample_time, self.delay) <= MOST]
+        laws, along = loops_about(setup, begun, readings[: loop.taken], models)
         estimate = None
-        if observed is not None:
-            true = ideal.read(*np.split(np.array(states[: loop.taken]), [n_q, rates], axis=1)).T
-            estimate = observed.record(dict(zip([each.name for each in estimated], true, strict=True)))
+        if observed is not None and states is not None:
+            estimate = observed.record(_true_values(task, states[: loop.taken]))
         with run.arithmetic:
-            error = np.linalg.norm(_position(run.model, run.q, tip) - place_at(run.time), axis=1)
+            error = np.linalg.norm(_position(run.model, run.q, task.tip) - place_at(run.time), axis=1)
+            # not of slower sensors, whose loops are not the same from sample to sample
+            loops = () if loop.is_slow else _loops_with_filters(task, laws)
             record = loop_record(self, setup, loop, acting, motion, loops=loops, lowest=lowest)
         record = replace(record, tip_error=error, feedback=along, estimate=estimate)
 
@@ -164,16 +113,117 @@ class ClosedLoop(SampledAnalysis):
 
         return replace(completed(run), look_closer=lambda: completed(closer))
 
-    def _signals(
-        self, context: ActuatedContext, plant: Model, robot: ControlledRobot
-    ) -> tuple[tuple[Signal, ...], tuple[Signal, ...]]:
-        """What sensors read, those that controllers need included, and what an observer estimates instead of these."""
-        signals = partial(make_signals, plant, context, whole=context.whole)
-        own = signals(self.sensor)
-        if self.observer is None:
-            return merged(own, signals(needed_sensors(robot, self.controller))), ()
-        tip = self.tip or default_tip(robot.model)
-        return tuple(own), merged(signals(estimated_sensors(robot, self.controller, tip)), ())
+
+def _task(analysis: ClosedLoop, context: ActuatedContext) -> LoopTask:
+    assert analysis.actuation is not None
+    source = context.outcomes[analysis.actuation]
+    plant, robot = with_compliance(context.model.without_paths()), whole_robot(context, source)
+    signals = partial(make_signals, plant, context, whole=context.whole)
+    read, estimated = tuple(signals(analysis.sensor)), tuple[Signal, ...]()
+    if analysis.observer is None:
+        read = merged(read, signals(needed_sensors(robot, analysis.controller)))
+    else:
+        tip = analysis.tip or default_tip(robot.model)
+        estimated = merged(signals(estimated_sensors(robot, analysis.controller, tip)), ())
+    amplifiers, ranges = joined(context.patches.values()), command_ranges(context.model, context.patches)
+    if analysis.unlimited:
+        amplifiers, ranges = amplifiers.unlimited(), np.inf * np.sign(ranges)
+    return LoopTask(
+        analysis=analysis,
+        context=context,
+        source=source,
+        plant=plant,
+        moved=with_motor_coordinates(source, plant),
+        robot=robot,
+        sensing=Sensing(plant, read),
+        ideal=Sensing(plant, estimated),
+        tip=place_of(context.whole, analysis.tip) or default_tip(plant),
+        amplifiers=amplifiers,
+        ranges=ranges,
+    )
+
+
+def _setup(task: LoopTask, outputs: Array) -> tuple[Setup, Array]:
+    """Samples before the last of `outputs` (s), with what is read there on the reference; and what is estimated."""
+    T, source, moved = task.analysis.sample_time, task.source, task.moved
+    samples = outputs[0] + np.arange(int(np.ceil(np.ptp(outputs) / T * (1 - 1e-12)))) * T
+    if not moved.gears:  # gears that give are known at outputs
+        source = _resolved(source)
+        moved = with_motor_coordinates(source, task.plant)
+    reference, wanted = (
+        between(samples, source.time, of.read(moved.q, moved.v, moved.a)) for of in (task.sensing, task.ideal)
+    )
+    filtered = Filter(task.sensing.signals, T)
+    reference[:] = [filtered(y) for y in reference]
+    setup = Setup(
+        robot=task.robot,
+        inputs=input_names(task.robot),
+        outputs=tuple(signal.name for signal in task.sensing.signals),
+        times=samples,
+        sample_time=T,
+        delay=task.analysis.delay,
+        reference=reference,
+        feed_forward=_feed_forward(task, samples),
+    )
+    return setup, wanted
+
+
+def _controllers(task: LoopTask, setup: Setup, wanted: Array) -> Sequence[Controller]:
+    """The controllers, or the observer that they ask, of values that are `wanted` (K, estimates) on the reference."""
+    if task.analysis.observer is None:
+        return make_controllers(task.analysis.controller, setup)
+    nominal = _feed_forward(task, setup.times, whole=True)
+    return [make_observed(task.analysis, task.context, setup, wanted, task.ranges, nominal)]
+
+
+def _control(
+    task: LoopTask, loop: Loop, samples: Array, states: list[Array] | None
+) -> tuple[Control, Callable[[Array], Array]]:
+    """The control of the plant by a loop, with states at samples added to `states`; and its commands at times (s)."""
+    plant, patches, delay = task.plant, task.context.patches, task.analysis.delay
+    splits = n_q, rates = plant.tree.n_q, plant.tree.n_q + plant.tree.n_v
+
+    def at_sample(k: int, t: float, state: Array) -> Array:
+        q, v, a = (part[None] for part in (state[:n_q], state[n_q:rates], state[rates:]))
+        if states is not None:
+            states.append(state.copy())
+        return loop(k, t, task.sensing.read(q, v, a)[0])
+
+    T, controller = task.analysis.sample_time, at_sample
+    arriving: Loop | AmplifiedLoop = loop
+    if task.amplifiers.acts:
+        directions = strain_directions(plant, patches)
+        arriving = controller = AmplifiedLoop(
+            loop, at_sample, samples, T, amplifiers=task.amplifiers, directions=directions, splits=splits
+        )
+        samples = arriving.times
+    instant = INSTANT * T
+    held = partial(held_commands, samples=samples, delay=delay, loop=arriving, after=instant)
+    control = Control(
+        commands=actuator_commands(plant, patches),
+        first=arriving.first,
+        times=samples,
+        delay=delay,
+        controller=controller,
+        held=partial(held, after=-instant),
+        instant=instant,
+    )
+    return control, held
+
+
+def _true_values(task: LoopTask, states: Sequence[Array]) -> dict[str, Array]:
+    """What an observer estimates, in the `states` of the plant, by name."""
+    n_q, n_v = task.plant.tree.n_q, task.plant.tree.n_v
+    values = task.ideal.read(*np.split(np.array(states), [n_q, n_q + n_v], axis=1))
+    return dict(zip([signal.name for signal in task.ideal.signals], values.T, strict=True))
+
+
+def _loops_with_filters(task: LoopTask, laws: Sequence[tuple[LinearModel, Feedback]]) -> Loops:
+    """Linear loops behind the filters of sensors, but for those of too many eigenvalues."""
+    T, delay = task.analysis.sample_time, task.analysis.delay
+    filtering = filters(task.sensing.signals, T)
+    loops = [(model, feedback.behind(*filtering)) for model, feedback in laws]
+    return [one for one in loops if eigenvalue_count(one, T, delay) <= MOST]
 
 
 def _resolved(source: Run) -> Run:
@@ -183,19 +233,19 @@ def _resolved(source: Run) -> Run:
     return run.at([int(k) for k in np.flatnonzero(apart)])
 
 
-def loop_models(
-    model: Model, time: Array, reference: MotorCoordinates, patches: Mapping[str, LinkPatches], read: Sequence[Signal]
-) -> tuple[LinearModel, ...]:
-    """Linearize the robot at rest on its `reference` over `time` (T,), s: at start, middle and end.
+def loop_models(task: LoopTask) -> tuple[LinearModel, ...]:
+    """Linearize the robot at rest on its path: at start, middle and end, with readings of sensors as outputs.
 
-    The signals `read` are outputs. Empty where there is no linear model, as in singular postures.
+    Empty where there is no linear model, as in singular postures.
     """
+    model, time, q = task.plant, task.source.time, task.moved.q
     rest, rows = np.zeros(model.tree.n_v), sorted({0, len(time) // 2, len(time) - 1})
     with suppress(SolveError, InputError):
-        linearisation, found = LinearEquations(model, reference.q[0]), []
+        linearisation, found = LinearEquations(model, q[0]), []
         for k in rows:
-            at = linearisation.at(float(time[k]), reference.q[k], rest, rest)
-            found.append(state_space(with_voltages(model, at, patches), readings_at(model, at, read)))
+            at = linearisation.at(float(time[k]), q[k], rest, rest)
+            readings = readings_at(model, at, task.sensing.signals)
+            found.append(state_space(with_voltages(model, at, task.context.patches), readings))
         return tuple(found)
     return ()
 
@@ -221,7 +271,7 @@ def loops_about(
         return law if law is None or observed is None else observed.schedule.at(t).closed(law)
 
     found = [(model, at(model.time, min(int(np.searchsorted(setup.times, model.time)), latest))) for model in models]
-    of, motors = joined(setup.patches.values()), np.zeros((2, len(setup.robot.motors)))
+    of, motors = joined(setup.robot.of_links.values()), np.zeros((2, len(setup.robot.motors)))
     late = np.hstack([motors, np.stack([of.lag, of.delay])])
     known = [(model, replace(feedback, late=late)) for model, feedback in found if feedback is not None]
     if len(known) < len(found) or not known:
@@ -230,10 +280,11 @@ def loops_about(
     return known, {t: law for t in times if (law := at(t, 0)) is not None}
 
 
-def _last_change(model: Model, analysis: ClosedLoop, time: Array) -> float:
+def _last_change(task: LoopTask, time: Array) -> float:
     """The time (s) from which paths and loads stay as they are at the end of `time` (T,)."""
-    exciting = [target for path in model.scene.trajectory for _, target in path.targets]
-    exciting += model.scene.load_functions
+    scene, analysis = task.plant.scene, task.analysis
+    exciting = [target for path in scene.trajectory for _, target in path.targets]
+    exciting += scene.load_functions
     exciting += [function for load in analysis.disturbance for function in load.components.values()]
 
     def values(of: TimeFunction, time: Array) -> Array:
@@ -242,16 +293,9 @@ def _last_change(model: Model, analysis: ClosedLoop, time: Array) -> float:
     return max((last_change(partial(values, of), time) for of in exciting), default=0.0)
 
 
-def _feed_forward(
-    context: ActuatedContext,
-    analysis: ClosedLoop,
-    source: Run,
-    moved: MotorCoordinates,
-    times: Array,
-    *,
-    whole: bool = False,
-) -> Array:
+def _feed_forward(task: LoopTask, times: Array, *, whole: bool = False) -> Array:
     """Torques and voltages (K, inputs) that are fed forward, in the middle of each command's time; `whole`: all."""
+    analysis, context, source, moved = task.analysis, task.context, task.source, task.moved
     middle = np.minimum(times + analysis.delay + analysis.sample_time / 2, source.time[-1])
     most = largest_moments(context.model, limits=False)
     values = supplied(source, most, context.patches, limited=not analysis.unlimited).sample(middle.tolist())
@@ -268,12 +312,13 @@ def _feed_forward(
     return values
 
 
-def _start(context: ActuatedContext, analysis: ClosedLoop, plant: Model, moved: MotorCoordinates) -> State:
+def _start(task: LoopTask) -> State:
     """As the inverse analysis starts, or as the scene says, compliant gears with their twist there."""
+    context, plant, moved = task.context, task.plant, task.moved
     if context.start is not None:
         return context.start
     q, v = moved.q[0].copy(), moved.v[0].copy()
-    if analysis.start == "actuation":
+    if task.analysis.start == "actuation":
         return State(q, v)
     first = initial_state(context.model, undeformed_posture(context.model))
     twists = [[part[0] for part in gear.twist(q[None], v[None])] for gear in plant.tree.gears]
@@ -285,14 +330,13 @@ def _start(context: ActuatedContext, analysis: ClosedLoop, plant: Model, moved: 
 
 
 def _followed(
-    run: Run, place_at: Callable[[Array], Array], held: Callable[[Array], Array], tip: str, quiet: float
+    task: LoopTask, run: Run, place_at: Callable[[Array], Array], held: Callable[[Array], Array], quiet: float
 ) -> LoopMotion:
     """The motion of the tip against the one wanted."""
-    assert isinstance(run.analysis, ClosedLoop)
     model = run.model
     signs = np.array([model.sign(joint) for joint, of in model.motors.items() for _ in of])
     rates = signs * run.v[:, model.motor_columns]
-    error = _position(model, run.q, tip) - place_at(run.time)
+    error = _position(model, run.q, task.tip) - place_at(run.time)
     return LoopMotion(
         time=run.time,
         error=error,
@@ -300,26 +344,26 @@ def _followed(
         rates=rates,
         held=held(run.time),
         completed=run.status == "completed",
-        is_disturbed=bool(run.analysis.disturbance),
+        is_disturbed=bool(task.analysis.disturbance),
         quiet=quiet,
         length=model.size,
     )
 
 
-def _place_of_tip(analysis: ClosedLoop, model: Model, source: Run, tip: str) -> Callable[[Array], Array]:
+def _place_of_tip(task: LoopTask) -> Callable[[Array], Array]:
     """Where the tip should be (T, d), m, at times (T,), s: on its paths, constant before 0 and after their end.
 
     Without a path, where it is in the inverse analysis until all paths end, then the final position.
     """
-    paths = [path.components for path in model.scene.trajectory if path.point == tip]
-    run, rest = source.closer, commanded_rest(source)
+    tip, run, rest = task.tip, task.source.closer, commanded_rest(task.source)
+    paths = [path.components for path in task.plant.scene.trajectory if path.point == tip]
     known = scipy.interpolate.CubicSpline(run.time, _position(run.model, run.q, tip))
 
     def place_at(time: Array) -> Array:
         place: Array = known(time)
         for components in paths:
             for component, target in components.items():
-                place[:, "xyz".index(component)] = target.sample(np.clip(time, 0.0, analysis.last_time))[0]
+                place[:, "xyz".index(component)] = target.sample(np.clip(time, 0.0, task.analysis.last_time))[0]
         if rest is not None:
             place[time >= rest.since] = _position(rest.model, rest.q[None], tip)[0]
         return place

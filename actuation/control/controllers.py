@@ -17,19 +17,12 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError, SolveError
 from ...common.python_files import count_failed, count_imports, imported_files
-from .linear_model import (
-    LinearModel,
-    SampledModel,
-    controllability,
-    kept_modes,
-    observability,
-    riccati,
-    sampled,
-    state_space,
-)
+from .linear_model import LinearModel, kept_modes, state_space
+from .reachability import controllability, observability
 from .records import ComputedTorque, JointPid, Lqr, ModalVelocity, StateFeedback
 from .records import Controller as Record
 from .robot import Setup, estimate
+from .sampled_model import SampledModel, riccati, sampled
 
 
 class Controller(Protocol):
@@ -324,7 +317,7 @@ def design_model(record: Lqr, setup: Setup, beside: Sequence[JointPid]) -> Linea
 
     Springs and dampers replace the joint controllers `beside`, without sampling and delay.
     """
-    row = int(np.argmin(np.abs(setup.source.time - record.time)))
+    row = int(np.argmin(np.abs(setup.robot.source.time - record.time)))
     mechanism = kept_modes(setup.robot.linear(row), record.modes)
     for pid in beside:
         for joint, name in setup.robot_coordinates(pid.joints):

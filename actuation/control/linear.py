@@ -14,19 +14,12 @@ from ...mbs.model.model import Model
 from ...mbs.run.record import Details, Run
 from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches
-from .linear_model import (
-    LinearModel,
-    Reachability,
-    Zeros,
-    controllability,
-    observability,
-    robot_modes,
-    state_space,
-    zeros,
-)
+from .linear_model import LinearModel, robot_modes, state_space
 from .margins import Suggestion, unhurried_gains
+from .reachability import Reachability, controllability, observability
 from .records import Sensor
 from .signals import make_signals, readings_at
+from .zeros import Zeros, zeros
 
 MOST_WORK = 2e8  # pairs whose zeros are computed, times cubed coordinates: some seconds
 

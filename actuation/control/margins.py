@@ -18,8 +18,9 @@ from ...common.arrays import Array, ComplexArray
 from ...common.keys import SMALLEST
 from ...common.structs import struct
 from ...common.toml_files import toml_key
-from .linear_model import LinearModel, SampledModel, locked_frequencies, sampled
+from .linear_model import LinearModel, locked_frequencies
 from .records import ControllerRecord, JointPid, ModalVelocity
+from .sampled_model import SampledModel, sampled
 
 STABLE = 1.0 + 1e-6  # of a spectral radius: undamped modes and joints without a controller are at 1, to round-off
 FEW, MOST = 150, 600  # eigenvalues of a loop: margins are sought for so many; for more than the second none are found

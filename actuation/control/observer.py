@@ -19,8 +19,9 @@ from ...common.libraries import scipy
 from ...common.structs import struct
 from ..context import ActuatedContext
 from .controllers import Controller, LinearFeedback, make_controllers
-from .linear_model import LinearModel, kept_modes, observability, riccati, sampled, state_space, zero_order_hold
+from .linear_model import LinearModel, kept_modes, state_space
 from .margins import Feedback
+from .reachability import observability
 from .records import (
     FilterRecord,
     GainsObserver,
@@ -31,6 +32,7 @@ from .records import (
     Sensor,
 )
 from .robot import ControlledRobot, Setup, default_tip, estimated_sensors
+from .sampled_model import riccati, sampled, zero_order_hold
 from .signals import Signal, filters, make_signals, merged, readings_at
 
 FAR = 1e9  # times the largest reading off its reference: such estimates diverge
@@ -380,7 +382,8 @@ def kalman_filters(
 
     Raises `InputError` where no filter exists: see `kalman`.
     """
-    robot, source, T = setup.robot, setup.source, setup.sample_time
+    robot, T = setup.robot, setup.sample_time
+    source = robot.source
     read, estimated = (make_signals(robot.plant, context, of) for of in (sensors, more))
     wanted = merged(estimated, ())
     names, signals = [signal.name for signal in wanted], (*read, *wanted)

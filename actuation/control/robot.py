@@ -282,20 +282,15 @@ class Setup:
     """Data for making a controller; SI units.
 
     Attributes:
-        model: equations of motion of the plant.
-        patches: patches by body.
         inputs, outputs: names of commands (torques N·m or N, voltages V) and readings, as `Signal` has them.
         times: (K,) of the samples, s.
         sample_time: s.
         delay: s, after which a command acts.
-        reference: (K, outputs) readings on the motion of `source`.
+        reference: (K, outputs) readings on the motion of the robot.
         feed_forward: (K, inputs) commands to which those of controllers are added.
-        source: run of the inverse analysis.
     """
 
     robot: ControlledRobot
-    model: Model
-    patches: Mapping[str, LinkPatches]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     times: Array
@@ -303,7 +298,6 @@ class Setup:
     delay: float
     reference: Array
     feed_forward: Array
-    source: Run
 
     def robot_coordinates(self, joints: Iterable[str]) -> Iterator[tuple[str, str]]:
         """Yield each joint with the name of each of its coordinates: "NAME", or "NAME 1", "NAME 2"."""

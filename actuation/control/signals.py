@@ -50,7 +50,7 @@ class Sensing:
 
     def __init__(self, model: Model, read: Sequence[Signal]) -> None:
         tree = model.tree
-        self._tree, self._count = tree, len(read)
+        self._tree, self.signals = tree, read
         self._linear = np.array([k for k, signal in enumerate(read) if not signal.point], dtype=int)
         self._order = np.array([read[k].order for k in self._linear], dtype=int)
         self._along = np.reshape([read[k].along for k in self._linear], (len(self._linear), tree.n_v))
@@ -73,7 +73,7 @@ class Sensing:
 
     def read(self, q: Array, v: Array, a: Array) -> Array:
         """Return readings (T, signals), SI units, in states q (T, n_q), v and a (T, n_v)."""
-        found = np.zeros((len(q), self._count))
+        found = np.zeros((len(q), len(self.signals)))
         values = q[:, self._where] @ self._along.T, v @ self._along.T
         found[:, self._linear] = np.where(self._order == ORDERS["value"], *values)
         if not self._points:
@@ -99,15 +99,15 @@ class Sensing:
         H, H_dot = about.transformation[:n_v], about.transformation_rate[:n_v]
         zero = np.zeros_like(H)
         steps = np.concatenate([[H, H_dot, zero], [zero, H, 2 * H_dot], [zero, zero, H]], axis=2)  # of q, v and a
-        found = np.zeros((self._count, steps.shape[2]))
+        found = np.zeros((len(self.signals), steps.shape[2]))
         of_rates = self._order == ORDERS["rate"]
         found[self._linear] = np.where(of_rates[:, None], self._along @ steps[1], self._along @ steps[0])
         if self._points:
             dq, dv, da = (STEP * np.concatenate([k * step.T for k in (1.0, -1.0, 2.0, -2.0)]) for step in steps)
             read = self.read(self._tree.integrate(about.q, dq), about.v + dv, about.a + da)
-            ahead, behind, far, farther = read.reshape(4, -1, self._count)
+            ahead, behind, far, farther = read.reshape(4, -1, len(self.signals))
             slopes = (8 * (ahead - behind) - (far - farther)).T / (12 * STEP)
-            others = np.setdiff1d(np.arange(self._count), self._linear)
+            others = np.setdiff1d(np.arange(len(self.signals)), self._linear)
             found[others] = slopes[others]
         by_s, by_rate, by_acceleration = np.split(found, 3, axis=1)
         return by_s, by_rate, by_acceleration

@@ -278,7 +278,7 @@ def write_loop(group: h5py.Group, _: Run, record: LoopRecord) -> None:
 
 def _by_size(poles: ComplexArray) -> ComplexArray:
     """Those (k,) of a sampled loop, the smallest first, in an order that round-off does not change."""
-    from ..actuation.control.linear_model import by_side
+    from ..actuation.control.zeros import by_side
 
     return poles[by_side(poles, np.zeros(len(poles)))]
 

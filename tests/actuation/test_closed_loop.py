@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from loop_scenes import INERTIA, PID, T, blow, loop, moving_at, wheel
 
-from ffrobot.actuation.control.linear_model import sampled
+from ffrobot.actuation.control.sampled_model import sampled
 from ffrobot.common.errors import InputError
 from ffrobot.pictures.figures.standard import standard_figures
 from ffrobot.results.file import Results

@@ -9,10 +9,11 @@ from scipy.linalg import expm, solve_discrete_are
 from scipy.stats import chi2
 
 from ffrobot.actuation.control.controllers import gains
-from ffrobot.actuation.control.linear_model import LinearModel, by_doubling, sampled, zero_order_hold
+from ffrobot.actuation.control.linear_model import LinearModel
 from ffrobot.actuation.control.margins import Feedback, loop_eigenvalues
 from ffrobot.actuation.control.observer import Schedule, hidden, kalman
 from ffrobot.actuation.control.records import KalmanObserver, Sensor
+from ffrobot.actuation.control.sampled_model import by_doubling, sampled, zero_order_hold
 from ffrobot.actuation.control.signals import Signal
 
 K_SPRING, PUSH, NOISE = 40.0, (0.7, 0.3), (2e-3, 5e-3)

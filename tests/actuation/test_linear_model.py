@@ -8,14 +8,9 @@ from oracle_runs import energies, evaluated
 from scipy.io import loadmat
 from scipy.optimize import brentq
 
-from ffrobot.actuation.control.linear_model import (
-    LinearModel,
-    controllability,
-    observability,
-    robot_modes,
-    state_space,
-    zeros,
-)
+from ffrobot.actuation.control.linear_model import LinearModel, robot_modes, state_space
+from ffrobot.actuation.control.reachability import controllability, observability
+from ffrobot.actuation.control.zeros import zeros
 from ffrobot.common.errors import InputError
 from ffrobot.mbs.linear.linearisation import LinearEquations
 from ffrobot.mbs.model.masses import with_payload

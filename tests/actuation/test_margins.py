@@ -8,7 +8,7 @@ from beam_links import beam_link, tube
 from loop_scenes import INERTIA, T, loop, wheel
 from scipy.linalg import expm
 
-from ffrobot.actuation.control.linear_model import LinearModel, locked_frequencies, sampled
+from ffrobot.actuation.control.linear_model import LinearModel, locked_frequencies
 from ffrobot.actuation.control.margins import (
     FRACTION,
     joint_gains,
@@ -21,6 +21,7 @@ from ffrobot.actuation.control.margins import (
     suggested_gains,
 )
 from ffrobot.actuation.control.records import JointPid
+from ffrobot.actuation.control.sampled_model import sampled
 from ffrobot.results.file import Results
 from ffrobot.results.write import results_image
 from ffrobot.run.solve import solve_scene

@@ -8,7 +8,7 @@ from loop_scenes import ENCODER, GAINS, INERTIA, KALMAN, PID, T, observed
 from scipy.linalg import solve_discrete_are
 
 import ffrobot
-from ffrobot.actuation.control.linear_model import sampled, zero_order_hold
+from ffrobot.actuation.control.sampled_model import sampled, zero_order_hold
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.exchange.export import export_file
 from ffrobot.scene.load import make_scene
