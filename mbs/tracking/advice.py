@@ -140,7 +140,7 @@ def _enough(share_with: Callable[[float], float], share: float, rate: float) -> 
     for _ in range(MOST_TRIES):
         more += (tried[-1][1] - np.log(NEAR)) / rate
         if not low < more < high:
-            more = (low + min(high, 4 * low)) / 2
+            more = (low + min(high, 4 * low or high)) / 2
         found = share_with(more)
         if not np.isfinite(found):
             break
