@@ -167,6 +167,7 @@ PATCH = {"body": "arm", "count": 2, "length": 0.05, "thickness": 3e-4, "width": 
         ({"d31": 110.0}, [], 0.0, "a d31 of 110 m/V: units are SI; is it in pm/V?"),
         ({"limit": 200.0}, [], 0.0, "load no. 1: patch 2 gets 300 V, beyond its limit of 200 V"),
         ({"limit": [100.0, 400.0]}, [], 0.0, None),
+        ({"amplifier": {"delay": [0.1, 2.0]}}, [], 0.0, "a delay of 2 s, the run ends at 1 s: is it in ms?"),
         ({}, [1.0, 1.0, 2.5], 0.0, 'interface "lump": no body has the moments of inertia 1, 1, 2.5 kg m²'),
         ({}, [1.0, 1.0, 2.0], 0.0, None),
         ({}, [], 90.0, 'joint "hub" begins at 90 rad'),
