@@ -295,15 +295,11 @@ class PztLayout(Record):
         )
 
     def with_one_limit(self, **changes: object) -> Self:
-        """Return a changed copy with one limit for all patches, whose number may change."""
-        of_all: dict[str, object] = {"limit": min(self.limit) if isinstance(self.limit, tuple) else self.limit}
-        if (of := self.amplifier) is not None:
-            least = {key: float(np.min(getattr(of, key))) for key, _ in of.lists() if key not in ("range", "delay")}
-            lowest = np.reshape(() if of.range is None else of.range, (-1, 2))
-            range = (float(lowest[:, 0].max()), float(lowest[:, 1].min())) if len(lowest) else None
-            least_all = {**least, "range": range, "delay": float(np.max(of.delay))}
-            of_all["amplifier"] = of.model_copy(update=least_all)
-        return self.model_copy(update={**of_all, "allocation": "least-squares", **changes})
+        """Return a changed copy with one range of voltages for all patches, whose number may change."""
+        lowest, highest = self.amplifiers().range
+        of_all = Amplifier.model_construct(range=(float(lowest.max()), float(highest.min())))
+        least: dict[str, object] = {"limit": None, "amplifier": of_all, "allocation": "least-squares"}
+        return self.model_copy(update=least | changes)
 
     def _check_plain(self) -> None:
         if abs(self.d31) < SMALLEST:
