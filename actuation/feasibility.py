@@ -190,13 +190,19 @@ class PatchFeasibility:
     @cached_property
     def remedies(self) -> Remedies:
         """Single changes with which the patches suffice, computed on request."""
+        if np.any(self.rates > KEPT):
+            return Remedies(np.inf, 0, np.inf, 0, len(self.rates), np.inf)
         return self.find_remedies()
 
     @property
     def factor(self) -> Array:
         """Ratio (k,) of required to available torque, slew rate or current; the patch suffices up to 1."""
-        rates = np.maximum(self.slew / self.slew_limit, self.current / self.current_limit)
-        return np.maximum(self.required_moment / self.available_moment, rates)
+        return np.maximum(self.required_moment / self.available_moment, self.rates)
+
+    @property
+    def rates(self) -> Array:
+        """Ratio (k,) of required to available slew rate or current, the larger one."""
+        return np.maximum(self.slew / self.slew_limit, self.current / self.current_limit)
 
     @property
     def mode_factor(self) -> Array:
@@ -287,14 +293,14 @@ def worst(values: Array, range: Array) -> tuple[Array, Array]:
 def _remedies(
     patches: PatchArray, required: Array, limit: Array, with_count: Callable[[int], float | None] | None
 ) -> Remedies:
-    """The limit, layers, thickness or count that alone would suffice, by c ∝ N (t_b + N t_p) for the worst patch."""
+    """The limit, layers, thickness or count that alone would suffice, by c ∝ N t_p (t_b + N t_p) of the worst patch."""
     k = int(np.argmax(required / limit))
     factor = float(required[k] / limit[k])
     t_b, t_p, N = float(patches.effects.extent[k]), patches.layout.thickness, patches.layout.layers
-    lever = max(factor, 1.0) * N * (t_b + N * t_p)  # N' (t_b + N' t_p) of the layers that suffice
-    layers = max(N, int(np.ceil((-t_b + np.sqrt(t_b**2 + 4 * t_p * lever)) / (2 * t_p) - 1e-9)))
-    lever = max(factor, 1.0) * t_p * (t_b + N * t_p)  # t (t_b + N t) of the thickness that suffices
-    thickness = (-t_b + np.sqrt(t_b**2 + 4 * N * lever)) / (2 * N)
+    layers, height = 0, np.inf
+    if not patches.layout.structural:  # else they stiffen the link, too
+        height = (-t_b + np.sqrt(t_b**2 + 4 * max(factor, 1.0) * N * t_p * (t_b + N * t_p))) / 2
+        layers = max(N, int(np.ceil(height / t_p - 1e-9)))
     count, most, missing = 0, len(patches.edges), factor
     if with_count is not None:
         missing, least = np.inf, float(np.abs(patches.amplifiers.range).min())
@@ -305,7 +311,7 @@ def _remedies(
             if missing <= 1.0:
                 count = number
                 break
-    return Remedies(float(required[k]), layers, float(thickness), count, most, missing)
+    return Remedies(float(required[k]), layers, float(height / N), count, most, missing)
 
 
 @struct

@@ -119,7 +119,7 @@ factor | | required over available, by patch
 mode_factor | | required over available, by mode
 [Remedies feasibility/pzt/*/remedies/@]
 limit | V | that is sufficient
-layers | | that are sufficient
+layers | | that are sufficient; 0 if they stiffen the link
 thickness | m | of a layer, at the same field
 count | | of patches of the same size
 most_count | | of patches that have room

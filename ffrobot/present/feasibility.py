@@ -16,6 +16,7 @@ from ..actuation.motors import MotorFeasibility
 from ..common.errors import InputError, check_known, quoted
 from ..common.libraries import scipy
 from ..results.file import Results
+from ..results.judging import FASTER
 from .lines import plain_table, print_table
 
 
@@ -129,14 +130,15 @@ def _remedy_line(judged: h5py.Group) -> str:
     if np.all(judged["factor"][()] <= 1.0):
         return f"the patches can do it; a limit of {_number(judged['remedies'].attrs['limit'])} V is sufficient"
     remedies = judged["remedies"].attrs
+    if np.isinf(remedies["limit"]):
+        return f"sufficient: {FASTER}"
     count = f"{remedies['count']} patches"
     if not remedies["count"]:
         missing = _number(remedies["most_factor"])
         count = f"no number of patches ({remedies['most_count']} fit; required/available = {missing})"
-    return (
-        f"sufficient alone: a limit of {_number(remedies['limit'])} V; {remedies['layers']} layers;"
-        f" layers of {_number(1e3 * remedies['thickness'])} mm at the same field; {count}"
-    )
+    if layers := remedies["layers"]:
+        count = f"{layers} layers; layers of {_number(1e3 * remedies['thickness'])} mm at the same field; {count}"
+    return f"sufficient alone: a limit of {_number(remedies['limit'])} V; {count}"
 
 
 def _amplifier_line(pzt: h5py.Group, judged: h5py.Group) -> str:

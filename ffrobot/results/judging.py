@@ -94,6 +94,7 @@ def _apart(group: h5py.Group, source: h5py.Group, scene: Scene) -> Iterator[tupl
             yield str(record["point"]), float(off.max()), float(np.sqrt(np.mean(off**2)))
 
 
+FASTER = "amplifiers of more current or slew, or a slower path"
 FAR_BEYOND = 10.0  # times their limit: no realistic patch supplies that
 STILL = 1e-9  # rad or m: what joints of a robot that does not move do
 AT_REST = 0.3  # of the mean rate of a path: what its first and last steps have at most
@@ -296,13 +297,12 @@ def _advice(
             yield f"{slower}, or another motor or gear for {', '.join(others)}"
     from_rest = asked and _is_from_rest_to_rest(group)
     for body, need in patches.items() if asked else ():
-        if 1.0 < need.factor <= FAR_BEYOND:
-            yield (
-                f"patches of {body}: a limit of {_number(need.limit)} V is sufficient; sufficient layers, thickness or"
-                " number: ffrobot feasibility"
-            )
+        if np.isinf(need.limit):
+            yield f"patches of {body}: {FASTER}"
+        elif 1.0 < need.factor <= FAR_BEYOND:
+            yield f"patches of {body}: a limit of {_number(need.limit)} V is sufficient; others: ffrobot feasibility"
     is_compliant = any("gear_moment" in joint for joint in group.get("joints", {}).values())
-    far = [body for body, need in patches.items() if asked and need.factor > FAR_BEYOND]
+    far = [body for body, need in patches.items() if asked and need.factor > FAR_BEYOND and need.limit < np.inf]
     if far and group.attrs["kind"] != "tracking":
         carried = "" if is_compliant else f'kind = "tracking"{"" if from_rest else " on a path from rest to rest"}, or '
         other = "a slower path" if group.attrs["kind"] == "fcid" else 'kind = "fcid" with shape = "static"'

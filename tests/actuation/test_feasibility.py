@@ -19,9 +19,9 @@ STRAIGHT = {"kind": "fcid", "shape": "zero"} | RUN
 MOTOR = {"moment_limit": 10.0, "speed_limit": 0.2, "power_limit": 1e3}
 
 
-def arm(analysis=STRAIGHT, target="0.1*sin(2*t)", limit=LIMIT, load=(), motor=MOTOR):
+def arm(analysis=STRAIGHT, target="0.1*sin(2*t)", limit=LIMIT, load=(), motor=MOTOR, **of_patches):
     """One horizontal link of the paper, its motor moved as `target` says."""
-    patches = CERAMIC | {"count": 10, "structural": False, "limit": limit, "depoling_field": 5e5}
+    patches = CERAMIC | {"count": 10, "structural": False, "limit": limit, "depoling_field": 5e5} | of_patches
     keys = {"gravity": [0.0, -9.81], "target": target, "pzt": [{"body": "link"} | patches], "load": list(load)}
     return solve_scene(one_link("link", paper_link(), {"name": "motion"} | analysis, joint=motor, **keys))
 
@@ -97,6 +97,15 @@ def test_remedies_do(word):
         case "thickness":
             same_field = LIMIT * remedies.thickness / 0.75e-3
             assert factor(thickness=remedies.thickness, limit=same_field) == pytest.approx(1.0, rel=1e-9)
+
+
+def test_layers_that_stiffen_and_slow_amplifiers_have_no_such_remedies():
+    stiff = judged_of(arm(structural=["stiffness"])).patches["link"].remedies
+    assert (stiff.layers, stiff.thickness) == (0, np.inf)
+    slow = judged_of(arm(limit=1e6, amplifier={"slew": 10.0})).patches["link"]
+    assert (slow.required_moment < slow.available_moment).all()
+    assert slow.factor.max() > 1.0
+    assert (slow.remedies.limit, slow.remedies.layers, slow.remedies.count) == (np.inf, 0, 0)
 
 
 def test_number_of_patches_that_would_do():
