@@ -27,6 +27,8 @@ def read_text(path: Path, kind: str) -> str:
     try:
         text = read_bytes(path, kind).decode("utf-8-sig")
     except UnicodeDecodeError as error:
+        if error.object.startswith(b"\x89HDF"):
+            raise InputError(f"{path}: expected a {kind}", "an HDF5 file (see ffrobot info)") from None
         line = error.object.count(b"\n", 0, error.start) + 1
         found = f"the byte {error.object[error.start]:#x}: save the file as UTF-8"
         raise InputError(f"{path}: line {line}: expected a {kind} in UTF-8", found) from None
