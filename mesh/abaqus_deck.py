@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -217,7 +217,7 @@ class Scope:
         if keyword.name == "ELSET":
             self.elsets.read(keyword, keyword.option("ELSET"))
         elif keyword.name == "SURFACE":
-            self.faces[keyword.option("NAME").upper()] = keyword
+            self.faces[_new_name(keyword, self.faces, "surfaces")] = keyword
         elif keyword.name == "MASS":
             self.weights.append(keyword)
         else:
@@ -298,6 +298,14 @@ class Scope:
         for _, number, place in self.elsets.meant(keyword.option("ELSET"), str(keyword)):
             nodes = self.solids[number][1] if number in self.solids else self.surfaces.get(number, ())
             self.nsets.add(keyword.option("NSET"), (("", node, place) for node in nodes))
+
+
+def _new_name(keyword: Keyword, known: Container[str], what: str) -> str:
+    """NAME=… in upper case, which none of the `known` parts, surfaces … has."""
+    name = keyword.option("NAME").upper()
+    if name in known:
+        raise InputError(f"{keyword}: expected {what} with unique names", f"{name} again")
+    return name
 
 
 def _of_length(keyword: Keyword, length: int) -> Iterator[tuple[list[str], str]]:
@@ -382,9 +390,7 @@ class Deck:
         self.unused -= {name for name in self.unused if not self.parts[name].solids}
 
     def _new_part(self, keyword: Keyword) -> Scope:
-        name = keyword.option("NAME").upper()
-        if name in self.parts:
-            raise InputError(f"{keyword}: expected parts with unique names", f"{name} again")
+        name = _new_name(keyword, self.parts, "parts")
         self.unused.add(name)
         return self.parts.setdefault(name, Scope())
 
@@ -392,7 +398,5 @@ class Deck:
         if {"LIBRARY", "INSTANCE"} & keyword.options.keys():
             raise InputError(f"{keyword}: expected an instance of a part in this deck", "one of results (LIBRARY=)")
         self.unused.discard(keyword.option("PART").upper())
-        name = keyword.option("NAME").upper()
-        if name in self.instances:
-            raise InputError(f"{keyword}: expected instances with unique names", f"{name} again")
+        name = _new_name(keyword, self.instances, "instances")
         return self.instances.setdefault(name, _instance(keyword, self.parts))
