@@ -47,9 +47,13 @@ def _by_gmsh(content: bytes, is_old: bool) -> RawMesh:
         content, partitions = _by_group(content) if is_old else (content, set())
         alone = Path(folder) / "mesh.msh"
         alone.write_bytes(content)
+        gmsh.logger.start()
         gmsh.merge(str(alone))
+        if again := [line for line in gmsh.logger.get() if "duplicate" in line]:
+            raise InputError("expected nodes with unique numbers", again[0])
         elements = [tags for entity in own_entities() for tags in gmsh.model.mesh.getElements(*entity)[1]]
-        for name, tags in (("Nodes", [gmsh.model.mesh.getNodes()[0]]), ("Elements", elements)):
+        read = ("Nodes", [gmsh.model.mesh.getNodes()[0]]), ("Elements", elements)
+        for name, tags in () if is_old else read:  # of version 2 nodes of no element are lost
             announced, counted = _announced(content, name), sum(map(len, tags))
             if announced != counted:
                 raise InputError(f"expected the {announced} {name.lower()} that ${name} announces", counted)
@@ -69,9 +73,7 @@ def _check_partitions(content: bytes) -> None:
 
 
 def _announced(content: bytes, name: str, place: int = 1) -> int:
-    """How many nodes or elements a section announces: the number at `place`, of version 2 the only one."""
-    if content.split(maxsplit=2)[1] < b"4":
-        return int((_section(content, name) or _section(content, f"Parametric{name}")).split(maxsplit=1)[0])
+    """How many members a section of version 4 announces: the number at `place`."""
     is_binary = content.split(maxsplit=3)[2] != b"0"
     data = content.partition(f"${name}".encode())[2].partition(b"\n")[2]
     return int(np.frombuffer(data, dtype="<u8", count=2)[place] if is_binary else data.split(maxsplit=2)[place])

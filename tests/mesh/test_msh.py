@@ -67,6 +67,7 @@ def test_elements_that_stand_in_the_file_twice_count_once(read, cells, binary):
     [
         ((b"$Elements\n8", b"$Elements\n9"), "the 9 elements that .Elements announces, found 8"),
         ((b"\n20 0.0", b"\n10 0.0"), "found a damaged one: Wrong node index 20"),
+        ((b"$Nodes\n24\n", b"$Nodes\n25\n10 9. 9. 9.\n"), "nodes with unique numbers, found .* 10"),
         ((b" 240 180\n", b" 250 180\n"), "found a damaged one: Wrong node index 250"),
         ((b"\n2.2 0", b"\n2.2 1"), "found big-endian ones"),
         ((b"-0.05", b"x"), "damaged one"),
@@ -97,6 +98,15 @@ def test_partitions_of_version_2(read, partitions, binary):
     assert integrate(part) == pytest.approx(VOLUME, rel=1e-9)
     alone = "all cells are of partition 1: others may be in separate files"
     assert part.remarks == (() if partitions == (1, 2) else (alone,))
+
+
+@pytest.mark.parametrize("binary", [False, True])
+def test_nodes_of_no_element(read, binary):
+    more = np.int32(7).tobytes() + np.zeros(3).tobytes() if binary else b"7 0. 0. 0.\n"
+    announced = b"$Nodes\n%d\n"
+    content = version_2(CELLS, [8] * 6, binary=binary)
+    part = read(content.replace(announced % len(POINTS), announced % (len(POINTS) + 1) + more))
+    assert integrate(part) == pytest.approx(VOLUME, rel=1e-12)
 
 
 @pytest.mark.parametrize("binary", [False, True])
