@@ -255,8 +255,9 @@ def _interfaces(body: ModalBody) -> Iterator[str]:
         return
     for name, interface in body.interfaces.items():
         axis = body.interpolate(float(interface.position[0]))
-        for key, of_all in (("translation", body.stations.translation), ("rotation", body.stations.rotation)):
-            error = np.max(np.abs(getattr(interface, key) - getattr(axis, key)), initial=0.0)
+        for key in ("position", "translation", "rotation"):
+            given, stated, of_all = (getattr(of, key) for of in (interface, axis, body.stations))
+            error = np.max(np.abs(given - stated), initial=0.0)
             if not np.isfinite(error) or error > INTERFACE_TOLERANCE * np.max(np.abs(of_all), initial=0.0):
                 yield f"interfaces/{name}/{key}: expected what stations say there, found a difference of {error:.2g}"
 
