@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 MOST_COMPRESSED = 1100  # gzip makes 1032 bytes of one at best
+_KINDS = {"c": "complex ones", "O": "text", "S": "text", "V": "records"}
 
 
 def open_checked(path: Path) -> h5py.File:
@@ -86,7 +87,8 @@ def read(dataset: h5py.Dataset) -> Any:
 def numbers(item: object, name: str) -> NDArray[np.float64]:
     """Read a dataset of numbers. Raises `InputError` where `item`, which messages call `name`, is none."""
     if not isinstance(item, h5py.Dataset) or item.dtype.kind not in "fiub":
-        raise InputError(f"{name}: expected a dataset of numbers", type(item).__name__.lower())
+        kind = item.dtype.kind if isinstance(item, h5py.Dataset) else "group"
+        raise InputError(f"{name}: expected a dataset of numbers", _KINDS.get(kind, kind))
     return np.asarray(read(item), dtype=np.float64)
 
 

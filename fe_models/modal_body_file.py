@@ -55,7 +55,6 @@ _PARTS: dict[str, tuple[str, type[DataclassInstance]]] = {
     "measured": ("modes/measured", MeasuredValues),
     "surface_patches": ("surface_patches", OutlinedPatches),
 }
-_KINDS = {"c": "complex ones", "O": "text", "S": "text", "V": "records"}
 _UNITS = {"length": "m", "mass": "kg", "first_moment": "kg m", "second_moment": "kg m2", "modes/frequency": "Hz"}
 
 
@@ -201,17 +200,14 @@ def _array(group: h5py.Group, name: str) -> Array:
     return np.asarray(_numbers(group[name]), dtype=np.float64)
 
 
-def _numbers(item: object) -> NDArray[Any]:
+def _numbers(item: h5py.Dataset | h5py.Group) -> NDArray[Any]:
     """A dataset of whole or real numbers, none so large that products of a few were infinite."""
-    name = getattr(item, "name", "").lstrip("/")
-    if isinstance(item, h5py.Dataset) and item.dtype.kind not in "fiub":
-        raise InputError(f"{name}: expected real numbers", _KINDS.get(item.dtype.kind, item.dtype))
+    name = item.name.lstrip("/")
     values = numbers(item, name)
     if np.any(np.abs(values) > LARGEST):
         worst = values.flat[np.abs(values).argmax()]
         raise InputError(f"{name}: expected numbers up to {LARGEST:g}", f"{worst:.3g}")
-    whole = isinstance(item, h5py.Dataset) and item.dtype.kind in "iu"
-    return values.astype(np.int64) if whole else values
+    return values.astype(np.int64) if item.dtype.kind in "iu" else values
 
 
 def _text(value: object) -> str:
