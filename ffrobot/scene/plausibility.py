@@ -151,12 +151,12 @@ def _patches(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
         if (layers := layout.layers * layout.thickness) > thick:
             yield f"{label}: patches {layers:g} m thick on a link of {thick:g} m: units are SI; is this in mm?"
 
-    for first, second in combinations((one for one in scene.pzt if one.face is not None), 2):
+    for first, second in combinations(scene.pzt, 2):
         from ..actuation.patches.patches import patch_edges
 
         if first.body != second.body or first.normal != second.normal or not is_beam(link := links.get(first.body)):
             continue
-        is_one_face = "both" in (first.face, second.face) or first.face == second.face
+        is_one_face = len({first.face, second.face} - {None, "both"}) < 2
         edges, others = (patch_edges(one, link.geometry.length) for one in (first, second))
         begins = np.maximum(edges[:, None, 0], others[None, :, 0])
         ends = np.minimum(edges[:, None, 1], others[None, :, 1]) - ROUND_OFF

@@ -198,6 +198,7 @@ def test_flexible_scenes_in_3d(patch, interface, joints, expected):
         ({"centers": [0.34]}, True),
         ({"centers": [0.40]}, False),
         ({"face": "-y"}, False),
+        ({"face": None}, True),
         ({"face": "+z", "bends": "out-of-plane"}, False),
         ({"width": 0.004}, False),
     ],
@@ -206,10 +207,11 @@ def test_patches_on_each_other(second, told):
     first = PATCH | {"centers": [0.3], "length": 0.1, "width": 0.014, "face": "+y", "name": "first"}
     first = {key: value for key, value in first.items() if key != "count"}
     link = LINK | {"geometry": LINK["geometry"] | {"section": {"shape": "rectangle", "height": 0.02, "width": 0.02}}}
+    other = {key: value for key, value in (first | {"name": "second"} | second).items() if value is not None}
     scene = program.make_scene(
         name="arm", space="spatial", gravity=[0.0, 0.0, 0.0], body=[{"name": "arm", "link": link}],
         joint=[{"name": "hub", "type": "weld", "between": ["ground", "arm.root"]}],
-        pzt=[first, first | {"name": "second"} | second], analysis=[{"name": "still", "kind": "static"}],
+        pzt=[first, other], analysis=[{"name": "still", "kind": "static"}],
     )  # fmt: skip
     assert any('"first", "second": patches on one place' in line for line in remarks(scene)) is told
 
