@@ -33,12 +33,12 @@ def reactions(run: Run) -> Mapping[str, Wrench]:
 
 def _carried(run: Run, forces: MotionForces, q: Array) -> dict[str, Wrench]:
     """By joint what it carries but does no work along it; q (T, n) are those of the tree of `forces`."""
-    wrenches, model = dict[str, Wrench](), run.model
+    model, nothing = run.model, np.zeros((len(q), 3))
+    loops = [joint.name for joint in model.tree.loops]
+    wrenches = dict.fromkeys(loops, Wrench(nothing, nothing))  # that of a free joint
     for number, row in enumerate(model.rows):
         if not row.is_trajectory and row.coordinate < 0:  # else it turns a rotor, along the joint
-            on_b = forces.of_row(number)[1]
-            wrenches[row.owner] = wrenches[row.owner].plus(on_b) if row.owner in wrenches else on_b
-    loops = {joint.name for joint in model.tree.loops}
+            wrenches[row.owner] = wrenches[row.owner].plus(forces.of_row(number)[1])
     for node, carried in zip(model.tree.nodes, forces.carried(q), strict=False):
         if node.joint.name in loops:
             continue

@@ -58,10 +58,14 @@ def redundant(results):
 
 
 def test_a_door_on_two_hinges():
-    """Of the least 2F² + 2m²/h² with Fh + 2m = Wb, where each hinge has F across and m: F = Wb/5h, m = 2Wb/5."""
+    """Of the least 2F² + 2m²/h² with Fh + 2m = Wb, where each hinge has F across and m: F = Wb/5h, m = 2Wb/5.
+
+    A free joint beside them carries nothing.
+    """
     hinges = {"low": ORIGIN, "high": [0.0, 0.0, HEIGHT]}
     leaf = rigid("leaf", WEIGHT / 10, [1.0] * 3, [ARM, 0.0, HEIGHT / 2], **hinges)
     joints = [pin(name, "ground", f"leaf.{name}", at=at) for name, at in hinges.items()]
+    joints.append({"name": "loose", "type": "free", "between": ["ground", "leaf.low"]})
     run = {"name": "inv", "kind": "forward", "end": 0.1, "output_step": 0.1}
     results = ffrobot.solve(ffrobot.make_scene(**scene([leaf], joints, run, gravity=[0.0, 0.0, -10.0])))
     assert re.search(r'5 constraints .* redundant.*"low" \(x, y, z, mx, my\)', redundant(results)[0])
@@ -70,6 +74,7 @@ def test_a_door_on_two_hinges():
         expected = [[sign * WEIGHT * ARM / (5 * HEIGHT), 0.0, WEIGHT / 2], [0.0, -2 * WEIGHT * ARM / 5, 0.0]]
         np.testing.assert_allclose(found, expected, atol=1e-9)
         assert list(results.attributes(f"inv/joints/{name}")["indeterminate"]) == ["x", "y", "z", "mx", "my"]
+    assert not results["inv/joints/loose/reaction"].any()
 
 
 def test_parallel_axes_of_rigid_links():
