@@ -260,9 +260,11 @@ def loop_rows(scene: MechanismScene, tree: KinematicTree, joint: JointRecord) ->
             f"a {joint.type} joint: list it before the other joints of its loop",
         )
     a, b = tree.sides(joint)
-    for equation in joint.loop_equations:
-        axes = ((e, e) for e in AXES) if equation.kind == "point" else [(AXES[equation.f], AXES[equation.g])]
-        yield from (ConstraintRow(joint.name, equation.kind, a, b, f, g, is_trajectory=False) for f, g in axes)
+    for kind, *at in joint.loop_equations:
+        axes = ((e, e) for e in AXES) if kind == "point" else [AXES[at]]
+        # in axes of the joint: which equations depend on others does not change as the mechanism turns
+        along = "slide" if kind == "point" and not scene.is_planar else kind
+        yield from (ConstraintRow(joint.name, along, a, b, f, g, is_trajectory=False) for f, g in axes)
 
 
 class CutMotion(NamedTuple):

@@ -1,4 +1,4 @@
-"""Loops in a plane, declared or found, whose equations turn dependent on the way: runs end there and say why."""
+"""Loops whose equations turn dependent on the way, in a plane, declared or found, and in space: runs end there."""
 
 import numpy as np
 import pytest
@@ -11,6 +11,7 @@ from ffrobot.run.watcher import Watcher
 from ffrobot.scene.load import make_scene
 
 CRANK, FOOT = 0.3, 1.0  # m
+SPIN = 6.0  # rad/s, of a base that turns on
 
 
 def rod(space, mass, length):
@@ -25,8 +26,9 @@ def point(space, x):
 
 
 def parallelogram(space, tolerance):
-    """Cranks under a coupler that fall from 1 rad above the flat posture."""
+    """Cranks under a coupler that fall from 1 rad above the flat posture; "turning": on a heavy base that spins."""
     cranks, ends, joints = ("crank0", "crank1"), ("root", "tip"), []
+    is_turning, space = space == "turning", "planar" if space == "planar" else "spatial"
     for k, (name, end) in enumerate(zip(cranks, ends, strict=True)):
         joints.append(pin(f"foot{k}", "ground", f"{name}.root", at=point(space, k * FOOT)))
         joints.append(pin(f"head{k}", f"{name}.tip", f"coupler.{end}"))
@@ -36,25 +38,37 @@ def parallelogram(space, tolerance):
     fall = {"name": "fall", "kind": "forward", "end": 1.0, "output_step": 0.01, "tolerance": tolerance}
     initial = {"joints": {"foot0": 1.0, "foot1": 1.0, "head0": -1.0}}
     joints = [joint | axis for joint in sorted(joints, key=lambda joint: joint["name"])]  # feet first
+    if is_turning:
+        feet = {f"foot{k}": point(space, k * FOOT) for k in range(2)}
+        bodies.append({"name": "base", "rigid": rod(space, 1e9, 1.0) | {"inertia": [1e9] * 3, "points": feet}})
+        for k in range(2):
+            joints[k] = pin(f"foot{k}", f"base.foot{k}", f"{cranks[k]}.root") | axis
+        joints.append(pin("waist", "ground", "base.foot0") | {"axis": [0.0, 1.0, 0.0]})
+        initial["joint_rates"] = {"waist": SPIN}
+        initial["joints"]["waist"] = 0.75  # a quarter turn from the ground's z before the fall ends
     return make_scene(**planar(bodies, joints, fall, gravity=gravity, space=space, initial=initial))
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-8])
-@pytest.mark.parametrize("space", ["planar", "spatial"])
+@pytest.mark.parametrize("space", ["planar", "spatial", "turning"])
 def test_a_parallelogram_that_falls_flat_stops_and_says_why(space, tolerance):
-    """Branches meet there; steps that would jump over the posture do not."""
+    """Branches meet there; steps that would jump over the posture do not.
+
+    Axes of joints on the base that spins turn from beside the ground's z to its x, where its other axes close the loop.
+    """
     run = solve_scene(parallelogram(space, tolerance), Watcher()).outcomes["fall"]
     assert run.status == "step underflow"
     assert run.statistics.cause.startswith("the configuration is singular or nearly so (ratio of singular values")
     assert 'loops that "head1" close' in run.statistics.cause
     angle = run.q[-1, run.model.columns("foot0")[0]]
     assert 0.0 < angle < 0.3
-    # of a pendulum: (J_cranks + m l²) ω²/2 = (m_cranks/2 + m) g l (sin 1 − sin θ)
+    # of a pendulum: (J_cranks + m l²) ω²/2 = (m_cranks/2 + m) g l (sin 1 − sin θ), and what spinning adds
     inertia, weight = 2 * 0.5 * CRANK**2 / 3 + 0.8 * CRANK**2, (0.5 + 0.8) * 9.81 * CRANK
-    theta = np.linspace(0.0, 1.0, 200_001)[:-1]
-    rate = np.sqrt(2 * weight / inertia * (np.sin(1.0) - np.sin(theta)))
-    substituted = np.sqrt(np.sin(1.0) - np.sin(theta))  # ∫dθ/ω, the end of which is integrable
-    assert np.isfinite(substituted).all()
+    theta = np.linspace(0.0, 1.0, 200_001)[:-1]  # ∫dθ/ω, the end of which is integrable
+    out, still = np.cos(theta), np.cos(1.0)
+    centrifugal = 1.3 * FOOT * CRANK * (out - still) + (inertia - CRANK**2 / 120) * (out**2 - still**2)
+    fallen = weight * (np.sin(1.0) - np.sin(theta)) + (space == "turning") * SPIN**2 / 2 * centrifugal
+    rate = np.sqrt(2 / inertia * fallen)
     assert run.statistics.time_reached == pytest.approx(float(np.sum(1 / rate) * (theta[1] - theta[0])), rel=5e-3)
 
 
