@@ -179,9 +179,9 @@ def _thickness_and_face(layout: PztLayout, link: BeamLink) -> tuple[float, float
 def _voltages(scene: Scene) -> Iterator[str]:
     layouts = {layout.label: layout for layout in scene.pzt}
     last = max((analysis.last_time for analysis in scene.analysis), default=0.0)
-    for layout in scene.pzt if last else ():
-        if (delay := layout.amplifiers().delay.max()) >= last:
-            yield f'pzt "{layout.label}": a delay of {delay:g} s, the run ends at {last:g} s: is it in ms?'
+    for label, one in layouts.items() if last else ():
+        if (delay := one.amplifiers().delay.max()) >= last:
+            yield f'pzt "{label}": a delay of {delay:g} s, the run ends at {last:g} s: is it in ms?'
     for k, load in enumerate(scene.load, 1):
         layout = layouts.get(load.pzt or "")
         if layout is None:
