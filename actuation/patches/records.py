@@ -267,9 +267,8 @@ class PztLayout(Record):
 
     def capacitance(self, *, clamped: bool = False) -> float:
         """Return the capacitance of one patch with all layers and faces, F: free to strain, or clamped."""
-        field = 1.0 / ((self.fibre_angle is not None and self.electrode_spacing) or self.thickness)
         volume = self.length * self.width * self.thickness * self.layers * (2 if self.face == "both" else 1)
-        return volume * (self.permittivity * field**2 - (self.lamina.energy if clamped else 0.0))
+        return volume * (self.permittivity / self.spacing**2 - (self.lamina.energy if clamped else 0.0))
 
     def amplifiers(self) -> Amplifiers:
         """Return the amplifiers of all k patches, with their hysteresis."""
@@ -375,8 +374,13 @@ class PztLayout(Record):
             d33=self.d33 or 0.0,
             d31=self.d31,
             angle=self.fibre_angle,
-            spacing=self.electrode_spacing or self.thickness,
+            spacing=self.spacing,
         )
+
+    @property
+    def spacing(self) -> float:
+        """Distance of the electrodes of a layer, m."""
+        return self.electrode_spacing or self.thickness
 
     @property
     def is_driven(self) -> bool:

@@ -7,6 +7,7 @@ import pytest
 from beam_links import beam_link, modal_body, rectangle, tube
 from patches_on_links import SCENE, patched
 
+from ffrobot.actuation.feasibility import judge_patches
 from ffrobot.actuation.patches.link_patches import check_reach, link_patches
 from ffrobot.actuation.patches.records import PztLayout, fibre_lamina, plain_lamina
 from ffrobot.common.errors import InputError
@@ -231,6 +232,15 @@ def test_voltages_of_two_planes_do_not_disturb_each_other():
     unmet = together.unmet(F_p, np.concatenate([found[name].within_limit for name in ("side", "up")], axis=1))
     left = np.isin(body.family, ("torsion", "axial"))
     np.testing.assert_allclose(unmet[:, left], F_p[:, left], rtol=1e-12)
+
+
+def test_field_between_interdigitated_electrodes():
+    body, time, F_p = link(SQUAT), np.arange(2.0), np.eye(2, 12)
+    of_link = link_patches(SCENE, [layout(fibre_angle=0.0)], body, from_modal_body("link", body))
+    array, volts = of_link.arrays["link"], of_link.voltages(F_p @ np.eye(12, body.mode_count))["link"]
+    forces = np.zeros((2, len(array.Phi_V)))
+    judged = judge_patches(array, volts, time, forces, forces, None)
+    np.testing.assert_allclose(judged.field, np.abs(volts.required).max(axis=0) / 0.5e-3, rtol=1e-12)
 
 
 @pytest.mark.parametrize(
