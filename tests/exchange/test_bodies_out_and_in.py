@@ -115,6 +115,13 @@ def test_lumped_masses_of_a_fem_file(bodies):
     assert any("lumped masses" in line for line in remarks)
 
 
+def test_damping_that_couples_modes_is_told(bodies):
+    text, _ = fem_text(bodies["cloud"])
+    changed = re.sub(r"(MODAL DAMPING MATRIX\n\S+) \S+", r"\g<1> 0.01", text)
+    told = [any("couples modes" in line for line in read_fem(each, "cloud")[1]) for each in (text, changed)]
+    assert told == [False, True]
+
+
 def with_all_points(body, points):
     zero = np.zeros((3, body.mode_count))
     more = {f"p{k}": Interface(points.x[k], points.Phi[k], zero) for k in range(2, len(points.x))}

@@ -62,6 +62,7 @@ CHANGES = {
     "object": (".SID_FEM", r"(?s)\n +Oe\n.*?end Oe", "", "expected the object Oe in modal, found none"),
     "no stiffness": (".SID_FEM", r"(?s)Ke\n(.*?)m0\(.*?end Ke", r"Ke\n\1end Ke", "a positive stiffness"),
     "cut": (".fem", r"(?s)\*\* RECORD GROUP 14.*", "", "which couple modes with rigid motion"),
+    "not symmetric": (".fem", r"(MODAL STIFFNESS MATRIX\n\S+) \S+", r"\g<1> 1e6", "K_e: expected a symmetric matrix"),
     "numbers": (".fem", r"\*\* RECORD GROUP 10", "1\n** RECORD GROUP 10", r"record 9: expected \d+"),
     "huge": (".fem", r"(RECORD GROUP 14.*\n)\S+", r"\g<1>1e200", "numbers of a body, found ones that are too large"),
 }  # fmt: skip

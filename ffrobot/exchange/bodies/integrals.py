@@ -30,7 +30,7 @@ from ...fe_models.modal_body.parts import LEVI_CIVITA
 from ...mbs.model.body import from_modal_body
 
 POSITIVE = 1e-9  # of the largest entry: less is round-off
-EXACT = 1e-12  # of the largest entry: modal masses are those of the shapes
+EXACT = 1e-12  # of the largest entry: modal masses are those of the shapes, or 1 and the stiffness diagonal
 ROUNDED = 1e-3  # likewise, in files of few digits
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 """ω_a ω_b of the columns of O_e."""
@@ -139,7 +139,7 @@ def _with_agreed_masses(integrals: ShapeIntegrals) -> tuple[ShapeIntegrals, tupl
     M, translational = integrals.modal_mass, integrals.translational_mass
     mean = np.sum(integrals.S_bar**2, axis=0) / integrals.mass
     sizes = np.sqrt(np.abs(mean) / np.maximum(np.diag(M), 1e-300))
-    if sizes.max(initial=0.0) > 1.0 + ROUNDED:
+    if sizes.max() > 1.0 + ROUNDED:
         raise InputError(
             "modal masses: expected at least those that the mean motion of the shapes has",
             f"mode {sizes.argmax() + 1} whose shape moves the center of mass {sizes.max():.3g} times as far as its"
@@ -166,7 +166,7 @@ def _section_inertia(integrals: ShapeIntegrals) -> dict[str, Array | float]:
     """
     turning = integrals.modal_mass - integrals.translational_mass
     J_spin, h_spin = 0.0, np.zeros(integrals.n_modes)
-    if np.abs(turning).max(initial=0.0) > EXACT * np.abs(integrals.modal_mass).max(initial=1.0):
+    if np.abs(turning).max() > EXACT * np.abs(integrals.modal_mass).max(initial=1.0):
         J_spin = float(1 / np.linalg.inv(integrals.about_center)[0, 0])
         rest = np.linalg.eigvalsh(turning - np.outer(integrals.spin[0], integrals.spin[0]) / J_spin)
         if rest[0] >= -POSITIVE * np.abs(turning).max():
@@ -229,7 +229,6 @@ def _interfaces(nodes: Nodes, numbers: Mapping[str, int]) -> dict[str, Interface
     return {name: nodes[number] for name, number in named.items()}
 
 
-ORTHONORMAL = 1e-12  # of M_e = E and of K_e diagonal: then modes stay as they are
 ON_AXIS = 1e-9  # of the body's size
 FAMILIES = ("axial", "in-plane-bending", "out-of-plane-bending", "torsion")
 NOT_IN_THE_FILE = (
@@ -247,6 +246,10 @@ def modal_body(name: str, integrals: ShapeIntegrals, nodes: Nodes, text: str) ->
     integrals, remarks = _with_agreed_masses(integrals)
     T, omega2 = _orthonormal(integrals)
     integrals, n = integrals.transformed(T), len(omega2)
+    root = omega2**0.25
+    Z = integrals.damping / np.outer(root, root)
+    if np.abs(Z * (1 - np.eye(n))).max() > ROUNDED * np.abs(Z).max():
+        remarks += ("damping that couples modes is left out",)
     nodes = {number: Interface(at.position, at.translation @ T, at.rotation @ T) for number, at in nodes.items()}
     interfaces = _interfaces(nodes, numbers)
     ends = [interfaces["root"], interfaces["tip"]]
@@ -296,7 +299,9 @@ def _orthonormal(integrals: ShapeIntegrals) -> tuple[Array, Array]:
             "K_e: expected a positive stiffness of every mode", f"{squares.min():g}: leave out rigid modes"
         )
     size = np.sqrt(np.outer(squares, squares))
-    if np.abs(M - np.eye(n)).max() <= ORTHONORMAL and np.abs((K - np.diag(squares)) / size).max() <= ORTHONORMAL:
+    if np.abs((K - K.T) / size).max() > ROUNDED:
+        raise InputError("K_e: expected a symmetric matrix", "another")
+    if np.abs(M - np.eye(n)).max() <= EXACT and np.abs((K - np.diag(squares)) / size).max() <= EXACT:
         return np.eye(n), squares
     try:
         omega2, T = eigh(0.5 * (K + K.T), 0.5 * (M + M.T))
@@ -309,7 +314,7 @@ def _orthonormal(integrals: ShapeIntegrals) -> tuple[Array, Array]:
 
 def _condition(interfaces: Mapping[str, Interface]) -> str:
     """Cantilever if the root does not move in the frame; else the other name."""
-    sizes = {name: np.abs(at.translation).max(initial=0.0) for name, at in interfaces.items()}
+    sizes = {name: np.abs(at.translation).max() for name, at in interfaces.items()}
     return "cantilever" if sizes["root"] <= 1e-9 * max(sizes.values()) else "simply-supported"
 
 
