@@ -22,11 +22,10 @@ from .included import number_of
 from .source import PointMass, RawMesh, left_out
 
 # Corners of the sides S1, S2 … (Abaqus Analysis User's Guide, "Three-dimensional solid element library").
-_SIDES: dict[int, list[tuple[int, ...]]] = {
-    4: [(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)],
-    8: [(0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)],
+_SIDES: dict[str, list[tuple[int, ...]]] = {
+    "tetra": [(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)],
+    "hexahedron": [(0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)],
 }
-_CORNERS = {"tetra": 4, "tetra10": 4, "hexahedron": 8, "hexahedron20": 8}
 _SIDE = re.compile(r"S([1-6])")
 # Nodes of tied surfaces closer than this, relative to the part, are one.
 _COINCIDENT = 1e-5
@@ -127,8 +126,6 @@ class _Assembled:
         return faces
 
     def _sides(self, own: str, keyword: Keyword) -> Iterator[tuple[int, ...]]:
-        if keyword.options.get("TYPE", "ELEMENT").upper() != "ELEMENT":
-            return
         sets = self.scopes[own].elsets
         for row, place in keyword.rows():
             if (side := _side(row)) is None:
@@ -138,7 +135,7 @@ class _Assembled:
                     raise InputError(f"{place}: expected an instance of the assembly", instance)
                 if (solid := self.scopes[instance or own].solids.get(number)) is None:
                     continue
-                for corners in _SIDES.get(_CORNERS.get(solid[0], 0), [])[int(side[1]) - 1 : int(side[1])]:
+                for corners in _SIDES.get(solid[0].rstrip("012"), [])[int(side[1]) - 1 : int(side[1])]:
                     yield tuple(self._node(instance or own, solid[1][corner], place) for corner in corners)
 
     def _tied(self) -> tuple[Integers, list[str]]:
@@ -195,7 +192,7 @@ class _Assembled:
                 continue
             nodes = [node for face in self._sides(own, keyword) for node in face]
             if nodes := nodes or self._surface_node_list(own, keyword):
-                return np.unique(np.array(nodes, dtype=np.int64))
+                return np.unique(nodes)
         return None
 
     def _surface_node_list(self, own: str, keyword: Keyword) -> list[int]:
@@ -212,8 +209,7 @@ class _Assembled:
                 value = next((number_of(row[0], place) for row, place in keyword.rows()), 0.0)
                 name = keyword.options.get("ELSET", "").upper()
                 for of, number, _ in sets.numbers(name) if name in sets.members else ():
-                    node = self.scopes[of or own].masses.get(number)
-                    if node is not None:
+                    if (node := self.scopes[of or own].masses.get(number)) is not None:
                         place = self._node(of or own, node, f"element {number}")
                         yield PointMass(f"{keyword}, element {number}", value, self.points[place])
 
