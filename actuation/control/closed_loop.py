@@ -181,7 +181,7 @@ def _control(
 ) -> tuple[Control, Callable[[Array], Array]]:
     """The control of the plant by a loop, with states at samples added to `states`; and its commands at times (s)."""
     plant, patches, delay = task.plant, task.context.patches, task.analysis.delay
-    splits = n_q, rates = plant.tree.n_q, plant.tree.n_q + plant.tree.n_v
+    n_q, rates = plant.tree.n_q, plant.tree.n_q + plant.tree.n_v
 
     def at_sample(k: int, t: float, state: Array) -> Array:
         q, v, a = (part[None] for part in (state[:n_q], state[n_q:rates], state[rates:]))
@@ -194,7 +194,7 @@ def _control(
     if task.amplifiers.acts:
         directions = strain_directions(plant, patches)
         arriving = controller = AmplifiedLoop(
-            loop, at_sample, samples, T, amplifiers=task.amplifiers, directions=directions, splits=splits
+            loop, at_sample, samples, T, amplifiers=task.amplifiers, directions=directions, n_q=n_q
         )
         samples = arriving.times
     instant = INSTANT * T

@@ -85,8 +85,7 @@ class Loop:
 class AmplifiedLoop:
     """Sampled loop with amplifiers, called at every step: motor commands, and mean voltages behind the amplifiers.
 
-    `directions` (k, n_v) times v: current, A, by the strain of each of k patches; `splits`: begin and end of v in a
-    state.
+    `directions` (k, n_v) times v: current, A, by the strain of each of k patches; states are `n_q` coordinates, v, a.
     """
 
     def __init__(
@@ -98,7 +97,7 @@ class AmplifiedLoop:
         *,
         amplifiers: Amplifiers,
         directions: Array,
-        splits: tuple[int, int],
+        n_q: int,
     ) -> None:
         # steps of a sample: two in the shortest time constant, four where rates or currents have limits, at most 20,
         # as few as divide delays
@@ -107,7 +106,7 @@ class AmplifiedLoop:
         late = np.outer(parts, amplifiers.delay / T)
         self._parts = int(parts[np.abs(late - np.rint(late)).max(axis=1).round(1).argmin()])
         self._loop, self._at_sample, self._samples, self._amplifiers = loop, at_sample, samples, amplifiers
-        self._directions, self._v, self._h = directions, slice(*splits), T / self._parts
+        self._directions, self._n_q, self._h = directions, n_q, T / self._parts
         self.times: Array = (samples[:, None] + self._h * np.arange(self._parts)).ravel()
         self.first, self.taken = loop.first, 0
         self.commands = np.zeros((len(self.times), len(self.first)))
@@ -124,9 +123,9 @@ class AmplifiedLoop:
         last = loop.commands[loop.taken - 1]
         wanted = np.array([self._wanted(t, motors + j, d) for j, d in enumerate(self._amplifiers.delay)])
         wanted = self._compensated.at(wanted)
-        self._now, mean = self._amplifiers.advance(
-            self._h, self._now, (wanted, wanted), self._directions @ state[self._v]
-        )
+        v, a = np.split(state[self._n_q :], 2)
+        strain = self._directions @ (v + self._h / 2 * a)  # in the middle of the step
+        self._now, mean = self._amplifiers.advance(self._h, self._now, (wanted, wanted), strain)
         command: Array = np.concatenate([last[:motors], self._played.at(mean, self._now)])
         self.commands[k], self.taken = command, k + 1
         return command

@@ -151,6 +151,9 @@ class Amplifiers:
         left = (np.where(unlimited, np.inf, (self.current - s) / self.capacitance) for s in (strain, -strain))
         most, least = (h * np.minimum(self.slew, of) for of in left)
         kept = np.clip(np.clip(after, now - least, now + most), *self.range)
+        most = np.where(kept > now, most, least)
+        ramp = kept - (kept - now) * np.abs(kept - now) / (2 * most)  # at that rate, then at rest
+        mean = np.where(np.abs(ramp - now) < np.abs(mean - now), ramp, mean)
         return kept, np.where(kept == after, mean, (now + kept) / 2)
 
     def output(self, times: Array, wanted: Array, strain: Array) -> Array:

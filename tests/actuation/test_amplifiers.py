@@ -36,6 +36,9 @@ def test_responses_in_closed_form():
     strain = 0.25e4 * C
     np.testing.assert_allclose(output(ramp, strain, current=1e4 * C)[0], 0.75e4 * TIME, atol=1e-10)
     np.testing.assert_allclose(output(-ramp, strain, current=1e4 * C)[0], -1.25e4 * TIME, atol=1e-10)
+    of, none = layout(count=1, amplifier={"slew": 5e3}).amplifiers(), np.zeros(1)
+    at_end, mean = of.advance(1e-3, none, (none + 2.0, none + 2.0), none)
+    assert (at_end, mean) == pytest.approx((2.0, 1.6))  # a ramp for 0.4 of the step
 
 
 def test_capacitance():
