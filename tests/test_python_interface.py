@@ -225,8 +225,8 @@ def test_pandas_view(results):
     assert "time" not in frame.columns
 
 
-def test_xarray_has_dimensions_units_and_coordinates(results):
-    """Every history as in the file; components by the names of their axes, modes by their numbers."""
+def test_xarray_has_dimensions_units_and_coordinates(results, folder, tmp_path):
+    """Every history as in the file; components by the names of their axes, modes by their numbers; NetCDF."""
     pytest.importorskip("xarray")
     dataset = results.to_xarray("inverse")
     assert set(dataset.data_vars) | {"time"} == set(results.histories("inverse"))
@@ -241,6 +241,10 @@ def test_xarray_has_dimensions_units_and_coordinates(results):
     units = {name: dataset[f"joints/shoulder/{name}"].attrs["units"] for name in ("coordinate", "rate", "moment")}
     assert units == {"coordinate": "rad", "rate": "rad/s", "moment": "N m"}
     assert dataset.attrs["kind"] == "pcid"
+    held = ffrobot.solve(swing(folder, analysis=[{"name": "held", "kind": "static"}])).to_xarray("held")
+    assert held["joints_locked/frequency"].dims == ("time", "joints_locked/frequency 1")
+    for number, each in enumerate((dataset, held)):
+        each.to_netcdf(tmp_path / f"{number}.nc", engine="scipy")
 
 
 def test_verdict_says_what_the_file_holds(folder, tmp_path, capsys):

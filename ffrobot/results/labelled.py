@@ -17,8 +17,7 @@ def labelled(results: Results, analysis: str, histories: Sequence[str]) -> Datas
     names = [name for name in histories if name != TIME and not name.startswith("control/")]
     if is_sampled := results.has(f"{analysis}/{SAMPLES}"):
         names += [f"control/{name}" for name in results.histories(f"{analysis}/control") if name != TIME]
-    coordinates: dict[str, Any] = {}
-    variables: dict[str, Any] = {}
+    coordinates, variables = dict[str, Any](), dict[str, Any]()
     for name in names:
         values = results[f"{analysis}/{name}"]
         dimensions = [SAMPLES if name.startswith("control/") else TIME]
@@ -35,14 +34,17 @@ def labelled(results: Results, analysis: str, histories: Sequence[str]) -> Datas
         variables[name] = (dimensions, values, of_name)
     for name in (TIME, SAMPLES) if is_sampled else (TIME,):
         coordinates[name] = (name, results[f"{analysis}/{name}"], {"units": "s"})
-    about = {key: value for key, value in results.attributes(analysis).items() if not isinstance(value, bytes)}
+    about = {
+        key: "\n".join(of) if getattr(of, "dtype", 0) == "O" else of
+        for key, of in results.attributes(analysis).items()
+        if not isinstance(of, bytes)
+    }
     return Dataset(variables, coordinates, {"scene": results.name, "analysis": analysis} | about)
 
 
 def _columns(results: Results, analysis: str, name: str, count: int) -> tuple[str, Sequence[Any]]:
     part = [*name.split("/"), name][1]
-    known = meaning(name)
-    columns = known.columns if known is not None and known.columns else name
+    columns = getattr(meaning(name), "columns", "") or f"{name} 1"
     dimension, labels = columns.format(part), list(LABELS.get(columns, ())[:count])
     if name.startswith("trajectories/"):
         labels = [str(one) for one in results.attributes(f"{analysis}/trajectories/{part}")["components"]]
