@@ -128,6 +128,8 @@ def export_file(
 
 def write_content(target: Path, content: Content, *, force: bool) -> None:
     """Write `content` to a file or folder. Raises `InputError` if it has other content; `force` replaces a file."""
+    if target.suffix == ".toml":
+        raise InputError(f"{target}: output: expected no scene or link file", '".toml"')
     if isinstance(content, str | bytes):
         data = content.encode() if isinstance(content, str) else content
         check_new_file(target, replace=force or holds(target, data))

@@ -309,7 +309,7 @@ def test_names_that_are_no_identifiers(tmp_path):
 REFUSED = {
     "along: expected a linear model of one instant, found 2; solve with one in `times`": ("--analysis", "along"),
     'expected a linear analysis ("at_rest", "along"), found "inverse"': ("--analysis", "inverse"),
-    "expected a new name or a file of kind zip": ("-o", "scene.toml", "--force"),
+    "expected no scene or link file": ("-o", "scene.toml", "--force"),
 }
 
 
