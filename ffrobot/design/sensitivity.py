@@ -58,6 +58,11 @@ class Sensitivity(Finding):
     tolerance: float
 
     @property
+    def shortfall(self) -> str | None:
+        """That there are no derivatives, or None."""
+        return "no derivatives" if np.isnan(self.derivative).all() else None
+
+    @property
     def value(self) -> Array:
         """Responses (g,) of the scene, SI units."""
         return np.array([reading.value for reading in self.readings.values()])
