@@ -124,7 +124,7 @@ class AmplifiedLoop:
         wanted = np.array([self._wanted(t, motors + j, d) for j, d in enumerate(self._amplifiers.delay)])
         wanted = self._compensated.at(wanted)
         v, a = np.split(state[self._n_q :], 2)
-        strain = self._directions @ (v + self._h / 2 * a)  # in the middle of the step
+        strain = self._directions @ (v + self._h / 2 * a)  # half way
         self._now, mean = self._amplifiers.advance(self._h, self._now, (wanted, wanted), strain)
         command: Array = np.concatenate([last[:motors], self._played.at(mean, self._now)])
         self.commands[k], self.taken = command, k + 1

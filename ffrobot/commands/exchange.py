@@ -116,13 +116,7 @@ ELSEWHERE = {
 
 @click.command()
 @click.argument("file", metavar="RESULTS.h5|BODY.h5|SCENE.toml", type=FILE)
-@click.option(
-    "--format",
-    "file_format",
-    metavar="FORMAT",
-    required=True,
-    help="Format, one of those above.",
-)
+@click.option("--format", "file_format", metavar="FORMAT", required=True, help="One of those above.")
 @click.option(
     "--analysis",
     metavar="NAME",

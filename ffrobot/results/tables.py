@@ -59,8 +59,8 @@ def placement_cells(results: Results, analysis: str) -> Iterator[Cells]:
     """Yield the table row of a placement of patches: optimum and evenly spaced ones by its criterion, centers (m)."""
     if not results.has(group := f"{analysis}/placement"):
         return
-    about, criterion = results.attributes(group), results.attributes(group)["criterion"]
-    pair = np.array([results[f"{group}/{which}/value"] for which in ("best", "even")])
+    about = results.attributes(group)
+    criterion, pair = about["criterion"], np.array([results[f"{group}/{which}/value"] for which in ("best", "even")])
     texts = [f"{-1e6 * value:.4g} µm" if criterion == "estimate" else f"{value:.4g}" for value in pair]
     if criterion == "voltage":
         texts = [f"{volts(value)} V" for value in results[f"{group}/largest_voltage"]]

@@ -57,8 +57,7 @@ class Spelled:
 class NormalInPlane(OnlyIn):
     """Marks an axis that planar scenes do not have: it is `NORMAL` there, and required in 3D. Its default is None."""
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.with_info_wrap_validator_function(self._read, handler(source))
+    __get_pydantic_core_schema__ = Spelled.__get_pydantic_core_schema__
 
     @staticmethod
     def _read(value: Any, handler: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:

@@ -194,14 +194,12 @@ def _has_own_coordinates(node: Node) -> bool:
 
 
 def _modes_and_strains(model: Model, links: Mapping[str, ModalBody]) -> Iterator[Linear]:
-    """Modal coordinates in each body's file, then strains at points, link axes; of 2D scenes those in the plane."""
+    """Modal coordinates in each body's file, and strains at its points, link axes; of 2D scenes in the plane."""
     rows = list[tuple[Node, Variable, Array]]()
     for node in model.tree.nodes:
         name, T = node.body.name, node.body.modal_transform
         for k, row in enumerate(T, 1):
             rows.append((node, Variable(f"modal/{name}/{k}", "kg0.5.m", f"modal coordinate {k} of {name}"), row))
-    for node in model.tree.nodes:
-        name, T = node.body.name, node.body.modal_transform
         for label, point in links[name].stress.items() if name in links else ():
             for component, row in zip(COMPONENTS, point.strain @ T, strict=True):
                 about = f"strain {component} at {label} of {name}"
