@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -187,7 +187,7 @@ class PatchFeasibility:
     mode_available: Array
     find_remedies: Callable[[], Remedies]
 
-    @cached_property
+    @property
     def remedies(self) -> Remedies:
         """Single changes with which the patches suffice, computed on request."""
         if np.any(self.rates > KEPT):
@@ -295,15 +295,15 @@ def _remedies(
 ) -> Remedies:
     """The limit, layers, thickness or count that alone would suffice, by c ∝ N t_p (t_b + N t_p) of the worst patch."""
     k = int(np.argmax(required / limit))
-    factor = float(required[k] / limit[k])
-    t_b, t_p, N = float(patches.effects.extent[k]), patches.layout.thickness, patches.layout.layers
+    factor = required[k] / limit[k]
+    t_b, t_p, N = patches.effects.extent[k], patches.layout.thickness, patches.layout.layers
     layers, height = 0, np.inf
     if not patches.layout.structural:  # else they stiffen the link, too
         height = (-t_b + np.sqrt(t_b**2 + 4 * max(factor, 1.0) * N * t_p * (t_b + N * t_p))) / 2
         layers = max(N, int(np.ceil(height / t_p - 1e-9)))
     count, most, missing = 0, len(patches.edges), factor
     if with_count is not None:
-        missing, least = np.inf, float(np.abs(patches.amplifiers.range).min())
+        missing, least = np.inf, np.abs(patches.amplifiers.range).min()
         for number in range(patches.served, 200):
             if (largest := with_count(number)) is None:
                 break
@@ -311,7 +311,7 @@ def _remedies(
             if missing <= 1.0:
                 count = number
                 break
-    return Remedies(float(required[k]), layers, float(height / N), count, most, missing)
+    return Remedies(required[k], layers, height / N, count, most, missing)
 
 
 @struct

@@ -29,6 +29,7 @@ from ...mbs.scene.analysis import ActuatedAnalysis, Analysis, Need
 from ...mbs.scene.loads import Load
 
 Measure = Literal["value", "rate", "acceleration", "accelerometer", "gyro"]
+SUBJECTS = "joint", "motor", "point", "pzt", "modal", "strain"
 
 
 class Sensor(Referring):
@@ -81,7 +82,7 @@ class Sensor(Referring):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        subject = one_of(self, ("joint", "motor", "point", "pzt", "modal", "strain"))
+        subject = one_of(self, SUBJECTS)
         every = get_args(Measure)
         known = {"pzt": every[:1], "strain": every[:1], "point": every}.get(subject, every[:2])
         if self.measure not in known:
@@ -103,18 +104,19 @@ class Sensor(Referring):
 
 
 def check_sampling(sensors: Sequence[Sensor], T: float, whose: str, *, at_every_sample: bool) -> None:
-    """Raise `ValueError` for delays and sample times of sensors that are no multiples of the sample time T, s.
+    """Raise `ValueError` for sensors twice, and delays and sample times that are no multiples of the sample time T, s.
 
     `at_every_sample`: also for sample times that are not T. `whose` names T in the message.
     """
+    read = [[getattr(sensor, key) for key in (*SUBJECTS, "measure")] for sensor in sensors]
     for k, sensor in enumerate(sensors, 1):
+        if read[k - 1] in read[: k - 1]:
+            raise ValueError(f"expected each sensor once, found no. {k} again")
         for key in ("delay", "sample_time"):
-            samples = (getattr(sensor, key) or 0.0) / T
+            samples = (value := getattr(sensor, key) or 0.0) / T
             if abs(samples - round(samples)) > 1e-6 or (key == "sample_time" and 0.0 < samples < 0.5):
-                raise ValueError(
-                    f"expected a multiple of {whose} ({T:g} s) as {key} of sensor no. {k}, found"
-                    f" {getattr(sensor, key):g} s"
-                )
+                rule = f"expected a multiple of {whose} ({T:g} s) as {key} of sensor no. {k}"
+                raise ValueError(f"{rule}, found {value:g} s")
             if round(samples) > 1 and key == "sample_time" and at_every_sample:
                 raise ValueError(f"expected sensors that read at every sample, found no. {k} slower")
 

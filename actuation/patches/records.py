@@ -297,8 +297,7 @@ class PztLayout(Record):
         """Return a changed copy with one range of voltages for all patches, whose number may change."""
         lowest, highest = self.amplifiers().range
         of_all = Amplifier.model_construct(range=(float(lowest.max()), float(highest.min())))
-        least: dict[str, object] = {"limit": None, "amplifier": of_all, "allocation": "least-squares"}
-        return self.model_copy(update=least | changes)
+        return self.model_copy(update={"limit": None, "amplifier": of_all, "allocation": "least-squares", **changes})
 
     def _check_plain(self) -> None:
         if abs(self.d31) < SMALLEST:

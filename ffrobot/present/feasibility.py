@@ -131,7 +131,7 @@ def _remedy_line(judged: h5py.Group) -> str:
         return f"the patches can do it; a limit of {_number(judged['remedies'].attrs['limit'])} V is sufficient"
     remedies = judged["remedies"].attrs
     if np.isinf(remedies["limit"]):
-        return f"sufficient: {FASTER}"
+        return f"needs {FASTER}"
     count = f"{remedies['count']} patches"
     if not remedies["count"]:
         missing = _number(remedies["most_factor"])

@@ -160,6 +160,7 @@ def test_a_scheduled_controller_is_a_table_of_systems(tmp_path):
         ({"sensor": [ENCODER], "observer": GAINS | {"outputs": ["joint/P"]}}, "observer: expected readings"),
         ({"sensor": [ENCODER], "observer": KALMAN | {"process": {"joint/P": 1.0}}}, 'expected an input .*"joint/P"'),
         ({"sensor": [ENCODER | {"delay": 0.4 * T}]}, "expected a multiple of the loop's sample_time"),
+        ({"sensor": [ENCODER, ENCODER | {"noise": 1.0}]}, "expected each sensor once, found no. 2 again"),
         ({"sensor": [ENCODER | {"sample_time": 2 * T}], "observer": KALMAN}, "read at every sample"),
         ({"observer": {"kind": "gains", "inputs": [], "outputs": ["joint/O"], "A": [[0.5]]}}, "B.*missing"),
         ({"sensor": [ENCODER], "observer": GAINS | {"B": [[1.0, 2.0]]}}, "expected B with 1 × 1"),
