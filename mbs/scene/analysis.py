@@ -295,7 +295,7 @@ class Robustness(Record):
     sample_time: Positive = 1e-3
     """Time for which a zero-order hold keeps commands, and between samples of the controller, s."""
     parameters: Annotated[tuple[Share, ...], NotEmpty] = (0.01, 0.05)
-    """Relative changes of the stiffness and of the mass of all flexible links, in both directions."""
+    """Relative changes of stiffness and mass of flexible links, with point masses on them, both ways."""
     gears: tuple[Share, ...] = (0.1,)
     """Relative changes of the stiffness of compliant gears, in both directions."""
     force: NotNegative = 0.01
