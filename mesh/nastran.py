@@ -69,8 +69,6 @@ def cards(path: Path) -> Iterator[Card]:
     for k, row in enumerate(rows):
         if row.end:
             ends[row.end] = -1 if row.end in ends else k
-    if rows and rows[0].follows and rows[0].begin not in ends:
-        raise InputError("expected a card (GRID …) first", f"a line that continues none ({rows[0].place})")
     after: dict[int, int] = {}
     for k, row in enumerate(rows):
         if not row.follows:
@@ -265,15 +263,17 @@ class _Deck:
     def _mass(self, card: Card) -> PointMass:
         """Of CONM1 or CONM2, whose offset is in rectangular axes; with CID = -1 it is the place in the basic ones."""
         point, offset = self._point(card.whole(1), card), np.zeros(3)
+        lost = " and its inertia" if any(card.fields[7:]) else ""
         if card.name == "CONM2":
             offset = np.array([card.real(k) for k in (4, 5, 6)])
         if (system := card.whole(2, 0)) == -1:
             point, offset = offset, np.zeros(3)
         elif np.any(offset):
             frame = self._frame(system, card)
-            offset = frame.C @ offset if frame.kind == "rectangular" else np.zeros(3)
-        turned = " and its inertia" if any(card.fields[7:]) else ""
-        return PointMass(f"{card.name} {card.whole(0)}{turned}, {card.place}", card.real(3), point + offset)
+            offset = frame.C @ offset
+            if frame.kind != "rectangular":
+                offset, lost = np.zeros(3), f"{lost} and its offset in {frame.kind} axes"
+        return PointMass(f"{card.name} {card.whole(0)}{lost}, {card.place}", card.real(3), point + offset)
 
     @staticmethod
     def _place(place: dict[int, int], node: int, card: Card) -> int:

@@ -133,6 +133,7 @@ def test_what_cannot_be_is_rejected_by_name(read, text, says):
         ("CONM2,99,2,,5.\n", "CONM2 99, line 37: mass 5 at (0, -0.1, 0.05) is left out"),
         ("CONM2,99,1,,2.,.1,.2,.3\n", "mass 2 at (0.1, 0.1, 0.25) is left out"),
         ("CONM2,99,1,7,2.,.1,.2,.3\nCORD2R,7,0,1.,0.,0.,1.,1.,0.\n,2.,0.,0.\n", "mass 2 at (0.1, 0.2, -0.25)"),
+        ("CONM2,99,1,7,2.,.1\nCORD2C,7,0,,,,,,1.\n,1.\n", "CONM2 99 and its offset in cylindrical axes, line 37"),
         ("CONM2,99,1,-1,2.,.1,.2,.3\n", "mass 2 at (0.1, 0.2, 0.3) is left out"),
         ("CONM2,99,1,,2.,,,,,\n,1.,,1.\n", "CONM2 99 and its inertia, line 37: mass 2 at (0, -0.1, -0.05)"),
         ("".join(f"CONM1,{k},1,,2.\n" for k in range(91, 99)), "3 more concentrated masses, 6 in all, are left out"),
