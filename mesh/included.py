@@ -17,7 +17,7 @@ _ABAQUS = re.compile(  # the keyword line goes on after a comma at its end
     r"""^[ \t]*\*(?:[^*\n,]|,[ \t]*+(?:\r?\n)?+)*?\bINP(?:UT?)?[ \t]*=[ \t]*["']?([^"',\r\n]+)""",
     re.MULTILINE | re.IGNORECASE,
 )
-_NASTRAN = re.compile(  # without quotes the name ends with the line
+_NASTRAN = re.compile(  # unquoted, a name ends with its line
     r"""^[ \t]*INCLUDE\b[ \t]*["']?((?<=["'])[^"']+|[^"'$\r\n]+)""", re.MULTILINE | re.IGNORECASE
 )
 _XDMF = re.compile(r">\s*([^<>:]+?)\s*:")

@@ -53,7 +53,7 @@ def _by_gmsh(content: bytes, is_old: bool) -> RawMesh:
             raise InputError("expected nodes with unique numbers", again[0])
         elements = [tags for entity in own_entities() for tags in gmsh.model.mesh.getElements(*entity)[1]]
         read = ("Nodes", [gmsh.model.mesh.getNodes()[0]]), ("Elements", elements)
-        for name, tags in () if is_old else read:  # of version 2 nodes of no element are lost
+        for name, tags in () if is_old else read:  # version 2 loses nodes of no element
             announced, counted = _announced(content, name), sum(map(len, tags))
             if announced != counted:
                 raise InputError(f"expected the {announced} {name.lower()} that ${name} announces", counted)

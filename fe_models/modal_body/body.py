@@ -179,6 +179,8 @@ class ModalBody(Integrals, Frozen):
 def _problems(body: ModalBody) -> Iterator[str]:
     """What does not hold of a modal body; the first one counts."""
     k = body.stations.position.shape[0]
+    if body.kind not in ("beam", "solid"):
+        yield f'kind: expected "beam" or "solid", found {body.kind}'
     for name, array, shape in _expected_shapes(body):
         if np.shape(array) != shape:
             yield f"{name}: expected shape {shape}, found {np.shape(array)}"

@@ -119,6 +119,7 @@ def test_copies_are_whole_and_immutable(copied, body):
 
 
 WRONG = {
+    "kind": ("Beam", "kind: expected .*, found Beam"),
     "mass": (-1.0, "mass: expected a positive number"),
     "length": (0.0, "length: expected a positive number"),
     "frequency": (np.array([1.0, 0.0]), "frequency: expected positive numbers"),
