@@ -20,7 +20,7 @@ from ...common.libraries import scipy
 from .. import _core
 from ..model.body import Body
 from ..model.known_motion import State
-from ..model.model import Model
+from ..model.model import NO_SLOPE, Model
 from ..model.system import MultibodySystem
 from ..posture.start import AWAY, rates_on_rows
 
@@ -235,7 +235,8 @@ class Statics:
     def _at_rest(self, q: Array) -> tuple[_core.ForcesAtRest, Array]:
         """What the core finds at q (n_q,), and C_v (rows, n_v) in natural sizes."""
         at = self.system.core.forces_at_rest(self.system.scene, self.t, q)
-        return at, (self.model.row_signs / self.row_sizes)[:, None] * at.C_q * self.sizes
+        C_v = (self.model.row_signs / self.row_sizes)[:, None] * at.C_q * self.sizes
+        return at, np.where(np.abs(C_v) > NO_SLOPE, C_v, 0.0)
 
     def _natural(self, q: Array) -> Array:
         """|q| (n_v,) in natural sizes, 1 of orientations; of links without loads, not 0 but round-off."""

@@ -18,6 +18,7 @@ from .tree import AlongCut, CutCoordinate, KinematicTree
 
 TOLERANCE = 1e-13  # of constraints, relative to the size of the robot
 MET = 1e3 * TOLERANCE  # what counts as met where round-off hinders
+NO_SLOPE = 1e-12  # in natural sizes: round-off of equations that hold by themselves
 LARGEST_TURN = 0.5  # rad (and sizes of the robot) that a Newton step may move: keeps to the branch of the guess
 
 
@@ -49,7 +50,8 @@ class Constraints(Kinematics):
         Equations are relative to natural sizes, coordinates to `sizes` (n_v,), by default those of joints.
         """
         sizes = self._joint_sizes if sizes is None else sizes
-        return self.values(q, times)[1] * sizes / self._row_sizes[:, None]
+        C_v = self.values(q, times)[1] * sizes / self._row_sizes[:, None]
+        return np.where(np.abs(C_v) > NO_SLOPE, C_v, 0.0)
 
     def turned_over(self, q: Array, times: Array) -> dict[str, Booleans]:
         """Return by name (T,) whether a loop joint or tool axis is turned by π at q (T, n_q) and `times` (T,), s.

@@ -57,9 +57,9 @@ def undeformed_posture(model: Model) -> State:
 def rates_on_rows(model: Model, q: Array, v: Array, locked: Booleans | None = None) -> Array:
     """Return v (n_v,) that meets constraints at q (n_q,), SI, t = 0, by least changes of joints not `locked` (n_v,)."""
     scales, now = model.joint_sizes if locked is None else np.where(locked, 0.0, model.joint_sizes), np.zeros(1)
-    (C_v,), (C_dot,) = model.constraints.values(q[None], now)[1], model.constraints.rates(q[None], v[None], now)
-    sizes = model.row_sizes
-    moved: Array = v - scales * np.linalg.lstsq(C_v * scales / sizes[:, None], C_dot / sizes, rcond=1e-10)[0]
+    (C_v,) = model.constraints.natural_gradients(q[None], now, scales)
+    (C_dot,) = model.constraints.rates(q[None], v[None], now)
+    moved: Array = v - scales * np.linalg.lstsq(C_v, C_dot / model.row_sizes, rcond=1e-10)[0]
     return moved
 
 

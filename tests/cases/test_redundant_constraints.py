@@ -77,6 +77,25 @@ def test_a_door_on_two_hinges():
     assert not results["inv/joints/loose/reaction"].any()
 
 
+def test_a_door_on_a_post_that_turns_moves_as_on_one_hinge():
+    """All equations of the second hinge hold by themselves: slopes of them are round-off, and hold nothing."""
+    found = []
+    for hinges in (("low",), ("low", "high")):
+        places = {"low": ORIGIN, "high": [0.0, 0.0, HEIGHT]}
+        post = rigid("post", 2.0, [0.3] * 3, [0.1, 0.0, 0.2], **places)
+        leaf = rigid("leaf", 3.0, [0.3, 0.2, 0.4], [ARM, 0.05, HEIGHT / 2], **places)
+        joints = [revolute("foot", "ground", "post.low", [0.3, 1.0, 0.2], motor=True, rpy=[0.1, 0.0, 0.3])]
+        joints += [pin(name, f"post.{name}", f"leaf.{name}") for name in hinges]
+        start = {"joints": {"foot": 0.4, "low": 0.3}, "joint_rates": {"foot": 1.0, "low": -2.0}}
+        runs = [{"name": "inv", "kind": "forward", "end": 0.5, "output_step": 0.1, "tolerance": 1e-8},
+                {"name": "lin", "kind": "linear"}]  # fmt: skip
+        tables = scene([leaf, post], joints, runs[0], gravity=[0.0, -9.8, 3.0], initial=start)
+        results = ffrobot.solve(ffrobot.make_scene(**tables | {"analysis": runs}))
+        found.append([results[f"inv/joints/{name}/coordinate"] for name in ("foot", "low")] + [results["lin/linear/A"]])
+    for one, two in zip(*found, strict=True):
+        np.testing.assert_allclose(two, one, rtol=0, atol=1e-8)
+
+
 def test_parallel_axes_of_rigid_links():
     """Open is what acts along the axes and across them; the weight along these is carried, in-plane forces stay."""
     flat, along = (four_bar(bar("coupler", 0.4, 0.7), [0.0, -9.8, g]) for g in (0.0, -3.0))

@@ -13,9 +13,9 @@ namespace {
 // constraint 1e-7.
 constexpr double dependent = 1e-10;
 
-// Nothing moves a constraint whose mobility, or squared gradient, is below this part of the largest: rounding leaves
-// 1e-30 of gradients. Mobilities of constraints across the plane of a mechanism are rounding of the elimination, which
-// may be more.
+// Nothing moves a constraint whose mobility is below this part of the largest, or whose squared gradient is below this
+// part of the largest and of 1: rounding leaves 1e-30 of gradients. Mobilities of constraints across the plane of a
+// mechanism are rounding of the elimination, which may be more.
 constexpr double immobile = 1e-24;
 
 // A constraint that moves less than this part of the largest comes after those that it depends on: its multiplier would
@@ -25,7 +25,7 @@ constexpr double slight = 1e-6;
 // Both in natural sizes
 std::vector<int> pivots(MatrixXd S, const VectorXd &squares) {
   const VectorXd own = S.diagonal();
-  const double largest = own.maxCoeff(), smallest = immobile * squares.maxCoeff();
+  const double largest = own.maxCoeff(), smallest = immobile * std::max(1., squares.maxCoeff());
   std::vector<int> left(S.rows()), kept;
   std::iota(left.begin(), left.end(), 0);
   const auto depends = [&](int i) {
