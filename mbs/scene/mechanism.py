@@ -124,9 +124,9 @@ class MechanismKeys(Record):
     def edges(self) -> list[Edge]:
         """All joints as edges between bodies, ranked by where loops are cut.
 
-        Loops are cut first at spherical joints, then at joints without forces (those without a value in [initial]
-        before the others), with friction or loads, and last with a rotor or a trajectory. Motors without rotors, and
-        joints whose coordinates analyses read, belong to the tree.
+        Loops are cut first at spherical joints, then at joints without forces, with friction or loads, with a value in
+        [initial], and last with a rotor or a trajectory. Motors without rotors, and joints whose coordinates analyses
+        read, belong to the tree.
         """
         return [Edge(joint.between, self._rank(joint)) for joint in self.joint]
 
@@ -142,9 +142,9 @@ class MechanismKeys(Record):
             return 0
         if followed:
             return 1
-        if joint.frictions or any(load.joint == joint.name for load in self.load):
+        if joint.name in self.initial.named("joints") | self.initial.named("joint_rates"):
             return 2
-        return 3 if joint.name in self.initial.named("joints") | self.initial.named("joint_rates") else 4
+        return 3 if joint.frictions or any(load.joint == joint.name for load in self.load) else 4
 
     @property
     def read_joints(self) -> frozenset[str]:

@@ -24,7 +24,8 @@ STARTS = {
 
 
 def started(space, initial):
-    tables = SPACES[space]({name: {} for name in SIDES}, [RUN], trajectory=[])
+    rough = {name: {} if name == "D" else {"viscous_friction": 1e-9} for name in SIDES}
+    tables = SPACES[space](rough, [RUN], trajectory=[])
     return ffrobot.solve(ffrobot.make_scene(**tables | {"initial": initial}))
 
 
