@@ -18,12 +18,12 @@ from types import SimpleNamespace
 import h5py
 import numpy as np
 import pytest
-from forked_commands import LIMIT, Commands
+from forked_commands import LIMIT, READING, Commands
 
 from ffrobot.batch import batch
 from ffrobot.common.cache import cache_folder
 from ffrobot.common.parallel import environment_without_mpi
-from ffrobot.mesh import form_cache
+from ffrobot.mesh import form_cache, part_reader
 
 pytest_plugins = ["costs"]
 MANY_SEEDS = 6
@@ -180,6 +180,20 @@ def ffrobot(own_cache):
     command = Command(own_cache, Path(OTHER_COMMAND or Path(sys.executable).with_name("ffrobot")))
     yield command
     command.forks.end()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def forked_readers():
+    """Each part is read in a process of its own, a fork of one that has loaded gmsh and meshio."""
+    readers = Commands(*READING)
+
+    def run(command, *, input, env, cwd, **options):
+        return readers.run([], env, cwd, given=input)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(part_reader, "subprocess", SimpleNamespace(run=run))
+        yield
+    readers.end()
 
 
 @pytest.fixture

@@ -1,9 +1,9 @@
-"""Commands of ffrobot as forks of one process that has loaded the program.
+"""Commands of ffrobot, and readers of parts, as forks of one process that has loaded what they need.
 
 `Commands.run` is `subprocess.run`: folder, environment, exit code (negative for a signal) and both streams are of that
 command alone, and what it does to its process ends with it. `python forked_commands.py` is the process that forks: it
 reads a line of JSON for each command, and answers with the number of its process, then with its exit code and the time
-of processors it took (s).
+of processors it took (s). With modules as arguments it loads these, and its forks are those of `read_apart`.
 """
 
 import gc
@@ -14,6 +14,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 
@@ -25,6 +26,7 @@ LOADED = (
     "ffrobot.present.start_postures", "ffrobot.scene.plausibility", "ffrobot.results.judging", "ffrobot.sweep.sweep",
     "ffrobot.actuation.feasibility", "scipy.integrate", "scipy.signal", "email.message", "concurrent.futures.process",
 )  # fmt: skip
+READING = ("gmsh", "h5py", "meshio", "ffrobot.mesh.mesh_files", "ffrobot.mesh.part")
 CASES = Path(__file__).parent.parent / "cases"
 LIMIT = 600  # s, of a command: also where much else runs
 BEFORE_LOADING = ("PYTHON", "OMP_", "OPENBLAS_", "LD_", "MPL")  # begin variables that are read as a process starts
@@ -35,16 +37,23 @@ class Commands:
 
     seconds = 0.0  # of processors, of all commands so far
 
-    def __init__(self):
+    def __init__(self, *loaded):
+        self._loaded = loaded
         self._server = None
         self._seconds = 0.0  # of its commands, which the system counts as its own when it ends
         self._environment = {}
 
-    def run(self, arguments, environment, folder, timeout=LIMIT, *, merged=False):
-        """As `subprocess.run(["ffrobot", *arguments], …)` with both streams captured as text, `merged` in stdout."""
+    def run(self, arguments, environment, folder, timeout=LIMIT, *, merged=False, given=b""):
+        """As `subprocess.run(["ffrobot", *arguments], …)` with both streams captured as text, `merged` in stdout.
+
+        Of a reader, which is `given` its request, they are bytes.
+        """
         with tempfile.TemporaryDirectory(prefix="ffrobot-command-") as streams:
             out, err = (Path(streams, name) for name in ("out", "out" if merged else "err"))
             request = {"arguments": arguments, "environment": environment, "folder": str(folder or Path.cwd())}
+            if given:
+                request["given"] = str(Path(streams, "in"))
+                Path(streams, "in").write_bytes(given)
             server = self._started(environment)
             server.stdin.write(json.dumps(request | {"out": str(out), "err": str(err)}) + "\n")
             server.stdin.flush()
@@ -55,7 +64,8 @@ class Commands:
             code, seconds = json.loads(server.stdout.readline())
             Commands.seconds += seconds
             self._seconds += seconds
-            told = [out.read_text(encoding="utf-8"), "" if merged else err.read_text(encoding="utf-8")]
+            read = Path.read_bytes if given else partial(Path.read_text, encoding="utf-8")
+            told = [read(out), "" if merged else read(err)]
         command = ["ffrobot", *arguments]
         if late:
             raise subprocess.TimeoutExpired(command, timeout, *told)
@@ -78,7 +88,7 @@ class Commands:
             self.end()
             self._environment = read
             self._server = subprocess.Popen(
-                [sys.executable, __file__], env=environment, text=True,
+                [sys.executable, __file__, *self._loaded], env=environment, text=True,
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             )  # fmt: skip
         return self._server
@@ -89,12 +99,13 @@ def main():
     sys.path.pop(0)  # this folder, which the command does not see
     answers = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)
-    for module in LOADED:
+    for module in sys.argv[1:] or LOADED:
         import_module(module)
-    from ffrobot.scene.load import load_scene
+    if not sys.argv[1:]:
+        from ffrobot.scene.load import load_scene
 
-    for case in ("two_link_closed_loop", "slider_crank_3d"):  # validators of tables are built with the first of a kind
-        load_scene(CASES / case / "scene.toml")
+        for case in ("two_link_closed_loop", "slider_crank_3d"):  # validators of tables are built with a kind's first
+            load_scene(CASES / case / "scene.toml")
     gc.freeze()
     for line in sys.stdin:
         child = os.fork()
@@ -106,16 +117,20 @@ def main():
         print(json.dumps([os.waitstatus_to_exitcode(status), used.ru_utime + used.ru_stime]), file=answers)
 
 
-def perform(arguments, environment, folder, out, err):
-    """Be the command: `ffrobot.__main__.main`, and the end of the process."""
+def perform(arguments, environment, folder, out, err, given=os.devnull):
+    """Be the command: `ffrobot.__main__.main`, or `part_reader.main`, and the end of the process."""
     os.chdir(folder)
     os.environ.clear()
     os.environ.update(environment)
-    nothing = os.open(os.devnull, os.O_RDONLY)
-    for path, stream in ((None, 0), (out, 1), (err, 2)):
-        os.dup2(nothing if path is None else os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600), stream)
-    sys.argv = ["ffrobot", *arguments]
-    from ffrobot.__main__ import main as command_line
+    os.dup2(os.open(given, os.O_RDONLY), 0)
+    for path, stream in ((out, 1), (err, 2)):
+        os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600), stream)
+    if given != os.devnull:
+        sys.path = environment["PYTHONPATH"].split(os.pathsep)
+        from ffrobot.mesh.part_reader import main as command_line
+    else:
+        sys.argv = ["ffrobot", *arguments]
+        from ffrobot.__main__ import main as command_line
 
     command_line()
     sys.exit()

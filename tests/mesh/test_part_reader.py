@@ -1,14 +1,22 @@
 """Reading a part in a process of its own: crashes, endless loops and words on stdout end with it, in one message."""
 
 import os
+import subprocess
 from pathlib import Path
 
 import pytest
 
 from ffrobot.common.errors import InputError
+from ffrobot.mesh import part_reader
 from ffrobot.mesh.part_reader import SECONDS, read_apart
 
 FILE = Path("part.step")
+
+
+@pytest.fixture(autouse=True)
+def started_anew(monkeypatch):
+    """No fork of `forked_readers`: the process that the program starts."""
+    monkeypatch.setattr(part_reader, "subprocess", subprocess)
 
 
 def crash(file):
