@@ -81,12 +81,16 @@ class Browser:
     def draw_all(self):
         """Scroll through the page until every chart has been near the window."""
         for y in range(0, self.value("document.body.scrollHeight"), 700):
-            self.run(f"window.scrollTo(0, {y})")
-            self.wait(
-                "[...document.querySelectorAll('[data-chart]')].every((c) => { const r = c.getBoundingClientRect();"
-                "return r.top > innerHeight || r.bottom < 0 || c.querySelector('.main-svg') })"
-            )
+            self.draw_from(f"window.scrollTo(0, {y})")
         self.run("window.scrollTo(0, 0)")
+
+    def draw_from(self, scroll):
+        """Scroll, and wait for the charts that are in the window then."""
+        self.run(scroll)
+        self.wait(
+            "[...document.querySelectorAll('[data-chart]')].every((c) => { const r = c.getBoundingClientRect();"
+            "return r.top > innerHeight || r.bottom < 0 || c.querySelector('.main-svg') })"
+        )
 
     def slide(self, name, value):
         """Move a slider as a user does."""
