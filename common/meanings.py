@@ -247,8 +247,8 @@ tip_error | m | distance from the reference
 time | s | of samples
 readings | | of sensors, in their units | readings
 reference | | what they would read on the reference | reference
-commands | N m, V | within limits | commands
-wanted | N m, V | before limits | wanted
+commands | N m, N, V | within limits | commands
+wanted | N m, N, V | before limits | wanted
 [Metrics control/@]
 verdict | | in words
 tip_error_rms | m | distance of the tip from its place
@@ -258,7 +258,7 @@ vibration | m | peak to peak in the last period
 residual | m | distance at the end
 motor_work | J | of all motors
 voltage_effort | V² s | of all patches
-peak_moment | N m | of commands
+peak_moment | N m, N | of commands
 peak_voltage | V | of commands
 saturated | | share of samples with a command at its limit
 overshoot | m | beyond the last place

@@ -126,7 +126,7 @@ def loop_cells(results: Results, analysis: str) -> Iterator[Cells]:
         "vibration\n(mm)": f"{1e3 * about['vibration']:.3g}",
         "final (mm)": f"{1e3 * about['residual']:.3g}",
         "work (J)": f"{about['motor_work']:.3g}",
-        "torque\n(N·m)": f"{about['peak_moment']:.3g}",
+        "torque\n(N·m, N)": f"{about['peak_moment']:.3g}",
         "voltage\n(V)": volts(about["peak_voltage"]),
         "at\nlimits": f"{100 * about['saturated']:.2g} %",
     }
