@@ -127,7 +127,7 @@ def joint_trajectory(motion: JointMotions) -> tuple[dict[str, Any], tuple[str, .
     if left:
         remarks.append(f"joints without motor left out: {', '.join(left)}")
     if not moments:
-        remarks.append("no joint has a motor: effort is left empty")
+        remarks.append("no torque of a motor is known: effort is left empty")
     begin = min(float(motion.time[0]), 0.0)
     if begin < 0.0:
         remarks.append(f"time_from_start 0 is t = {begin:g} s, when motors begin: the path does {-begin:g} s later")

@@ -78,7 +78,7 @@ def test_joint_trajectory_is_the_message(kind, request, ffrobot, tmp_path):
         seconds = [stamp["sec"] + 1e-9 * stamp["nanosec"] for stamp in stamps]
         np.testing.assert_allclose(seconds, group["time"], atol=0.6e-9)
         assert all(0 <= stamp["nanosec"] < 1_000_000_000 for stamp in stamps)
-    assert ("no joint has a motor: effort is left empty" in done.stdout) == (not driven)
+    assert ("no torque of a motor is known: effort is left empty" in done.stdout) == (not driven)
 
 
 @pytest.fixture(scope="module")
