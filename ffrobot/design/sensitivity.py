@@ -59,7 +59,7 @@ class Sensitivity(Finding):
 
     @property
     def shortfall(self) -> str | None:
-        """That there are no derivatives, or None."""
+        """Reason why there are no derivatives, or None."""
         return "no derivatives" if np.isnan(self.derivative).all() else None
 
     @property

@@ -195,18 +195,18 @@ def _has_own_coordinates(node: Node) -> bool:
 
 def _modes_and_strains(model: Model, links: Mapping[str, ModalBody]) -> Iterator[Linear]:
     """Modal coordinates in each body's file, and strains at its points, link axes; of 2D scenes in the plane."""
-    rows = list[tuple[Node, Variable, Array]]()
     for node in model.tree.nodes:
         name, T = node.body.name, node.body.modal_transform
-        for k, row in enumerate(T, 1):
-            rows.append((node, Variable(f"modal/{name}/{k}", "kg0.5.m", f"modal coordinate {k} of {name}"), row))
+        rows = [
+            (Variable(f"modal/{name}/{k}", "kg0.5.m", f"modal coordinate {k} of {name}"), row)
+            for k, row in enumerate(T, 1)
+        ]
         for label, point in links[name].stress.items() if name in links else ():
             for component, row in zip(COMPONENTS, point.strain @ T, strict=True):
                 about = f"strain {component} at {label} of {name}"
-                rows.append((node, Variable(f"strain/{name}.{label}/{component}", "1", about), row))
-    for node, variable, row in rows:
-        if np.any(row):
-            yield variable, _core.LinearOutput(list(range(node.p_q.start, node.p_q.stop)), row.tolist())
+                rows.append((Variable(f"strain/{name}.{label}/{component}", "1", about), row))
+        entries = list(range(node.p_q.start, node.p_q.stop))
+        yield from ((variable, _core.LinearOutput(entries, row.tolist())) for variable, row in rows if np.any(row))
 
 
 def _places(model: Model) -> Iterator[tuple[str, _core.PlaceOutput]]:
