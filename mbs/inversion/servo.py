@@ -20,7 +20,8 @@ from ..model.nodes import ConstraintRow
 from ..model.system import driven_mechanism, fastest_mechanism
 from ..posture.posture import check_smooth, describe_posture, mobility, worst_posture
 from ..posture.prescribed import PrescribedMotion, following_motors, left_slopes
-from ..posture.start import out_of_reach, undeformed_posture
+from ..posture.reach import out_of_reach
+from ..posture.start import undeformed_posture
 
 POSTURES = 201  # along the path, from which others are looked for
 EVERY = 10  # of these is looked at for singular ones

@@ -5,8 +5,9 @@ from ..model.gears import with_prescribed_motors
 from ..model.known_motion import State
 from ..model.model import Model
 from .posture import Mobility, check_path, mobility
+from .reach import check_reach
 from .redundancy import resolved
-from .start import check_reach, undeformed_posture
+from .start import undeformed_posture
 
 
 @struct

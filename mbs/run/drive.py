@@ -29,7 +29,7 @@ from ..posture.posture import (
     rank_of_redundant_loops,
     worst_posture,
 )
-from ..posture.start import out_of_reach
+from ..posture.reach import out_of_reach
 from ..scene.analysis import IntegratedAnalysis
 from .integrators import (
     EXPLICIT,
