@@ -9,8 +9,6 @@
 Importing this loads no finite element library; they are loaded where a link must be computed.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress

@@ -4,8 +4,6 @@ gmsh's order of corners: the tetrahedron's first three counter-clockwise seen fr
 hexahedron's lower face, then the upper one. See "Node ordering" in the manual of gmsh.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import lru_cache
 from types import MappingProxyType

@@ -3,8 +3,6 @@
 Sections are drawn about 1 long, in a power of ten of meters: gmsh and OpenCASCADE take points closer than 1e-7 for one.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from math import log10

@@ -3,8 +3,6 @@
 Importing this loads gmsh.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

@@ -4,8 +4,6 @@ meshio 5.0 knows neither families without groups nor hexahedra of 27 nodes, and 
 Cartesian ones. See "MED file format" in the documentation of MED 4.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any

@@ -6,8 +6,6 @@ into all physical groups that any of them has: the copy has entities of one grou
 manual of gmsh.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path

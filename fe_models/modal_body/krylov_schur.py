@@ -6,8 +6,6 @@ is missing, which no single Krylov space shows. SLEPc solves for one vector at a
 for several, which reads the factors of a large solid once.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Protocol
 

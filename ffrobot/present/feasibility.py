@@ -1,7 +1,5 @@
 """Tables of loads and limits of actuators in a results file, and motors of a catalog that suffice."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
