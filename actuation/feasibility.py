@@ -156,35 +156,20 @@ class Remedies:
 
 @struct
 class PatchFeasibility:
-    """Requirements on the patches of one layout in one analysis; k patches, n modes, peaks over time.
+    """Requirements on the patches of one layout in one analysis; k patches, n modes, peaks over time."""
 
-    Attributes:
-        required_moment: (k,) N·m at the required voltage.
-        available_moment: (k,) N·m at the limit.
-        saturation_time: (k,) s, when a limit is first exceeded; NaN where none is.
-        slew: (k,) V/s, largest of the required voltage, mean between outputs.
-        slew_limit: (k,) V/s.
-        current: (k,) A, largest at the required voltage, mean between outputs.
-        current_limit: (k,) A.
-        field: (k,) V/m in a layer at the required voltage.
-        limited_field: (k,) V/m at the voltage within the limit.
-        strain: (k,) of the outer surface by bending of the link, mean along the patch.
-        mode_required: (n,) N/√kg, largest modal force.
-        mode_available: (n,) N/√kg, modal force with every patch at its limit.
-    """
-
-    required_moment: Array
-    available_moment: Array
-    saturation_time: Array
-    slew: Array
-    slew_limit: Array
-    current: Array
-    current_limit: Array
-    field: Array
-    limited_field: Array
-    strain: Array
-    mode_required: Array
-    mode_available: Array
+    required_moment: Array  # (k,) N·m at the required voltage
+    available_moment: Array  # (k,) N·m at the limit
+    saturation_time: Array  # (k,) s, when a limit is first exceeded; NaN where none is
+    slew: Array  # (k,) V/s, largest of the required voltage, mean between outputs
+    slew_limit: Array  # (k,) V/s
+    current: Array  # (k,) A, largest at the required voltage, mean between outputs
+    current_limit: Array  # (k,) A
+    field: Array  # (k,) V/m in a layer at the required voltage
+    limited_field: Array  # (k,) V/m at the voltage within the limit
+    strain: Array  # (k,) of the outer surface by bending of the link, mean along the patch
+    mode_required: Array  # (n,) N/√kg, largest modal force
+    mode_available: Array  # (n,) N/√kg, modal force with every patch at its limit
     find_remedies: Callable[[], Remedies]
 
     @property

@@ -192,19 +192,14 @@ def _point(key: str, place: Place, body: ModalBody | None, spatial: Body) -> Bod
 
 @struct
 class PointForces:
-    """Forces at the actuation points of one body over time.
+    """Forces at the actuation points of one body over time."""
 
-    Attributes:
-        force: (T, c) N along each component, body axes.
-        unmet: (T, 6 + n) driving forces Q_a − L_a F_a on R and on the rotation, both in axes of the body, and on p: N,
-            N·m, N/√kg; in the plane (T, 3 + n) on (R, θ, p), R in global axes.
-        residual: (T,) N, norm of `unmet` times `PointSet.scale`.
-        rank, condition_number: least rank and largest condition number of L_a (`PointSet.scaled`) over time.
-    """
-
-    force: Array
+    force: Array  # (T, c) N along each component, body axes
+    # (T, 6 + n) driving forces Q_a − L_a F_a on R and on the rotation, both in axes of the body, and on p: N, N·m,
+    # N/√kg; in the plane (T, 3 + n) on (R, θ, p), R in global axes
     unmet: Array
-    residual: Array
+    residual: Array  # (T,) N, norm of `unmet` times `PointSet.scale`
+    # least rank and largest condition number of L_a (`PointSet.scaled`) over time
     rank: int
     condition_number: float
 

@@ -34,21 +34,13 @@ AREA = 1e-9  # of the bed of a patch, relative, that may be off
 
 @struct
 class PartBoundary:
-    """The boundary of a part; SI units.
+    """The boundary of a part; SI units."""
 
-    Attributes:
-        points: (p, 3) of the part, m.
-        facets: (b, 3 or 4) corners, counter-clockwise seen from outside.
-        centroid: (b, 3) of the facets, m.
-        normal: (b, 3) unit vectors that point outward.
-        area: (b,) in m², of the straight facets.
-    """
-
-    points: Array
-    facets: Integers
-    centroid: Array
-    normal: Array
-    area: Array
+    points: Array  # (p, 3) of the part, m
+    facets: Integers  # (b, 3 or 4) corners, counter-clockwise seen from outside
+    centroid: Array  # (b, 3) of the facets, m
+    normal: Array  # (b, 3) unit vectors that point outward
+    area: Array  # (b,) in m², of the straight facets
 
     @classmethod
     def of(cls, part: PartMesh) -> PartBoundary:

@@ -17,33 +17,24 @@ Tags = NDArray[np.int32]
 
 @struct
 class PartMesh:
-    """A solid part, meshed, in m.
+    """A solid part, meshed, in m."""
 
-    Attributes:
-        points: (p, 3) in m, in the link's frame once the part is placed.
-        cells: (c, v) points of each cell, in gmsh's order of nodes.
-        cell: shape of the cells.
-        degree: 1 (corners only) or 2 (curved cells: gmsh's 10 or 27 nodes).
-        cell_tag: (c,) tag of the region of each cell, 0 of none.
-        regions: volume group → its tag, the largest group first.
-        facets: (f, 3 or 4) corners of the tagged facets, all of them on the boundary.
-        facet_tag: (f,) tag of the face of each.
-        faces: name → tag in `facet_tag`; two names may share a face.
-        overlaps: volume group → further tags, of its cells that belong to other groups too.
-        remarks: what the part's file holds and the link does not, a sentence each.
-    """
-
-    points: Array
-    cells: Integers
-    cell: CellName
-    degree: int
-    cell_tag: Tags
+    points: Array  # (p, 3) in m, in the link's frame once the part is placed
+    cells: Integers  # (c, v) points of each cell, in gmsh's order of nodes
+    cell: CellName  # shape of the cells
+    degree: int  # 1 (corners only) or 2 (curved cells: gmsh's 10 or 27 nodes)
+    cell_tag: Tags  # (c,) tag of the region of each cell, 0 of none
+    # volume group → its tag, the largest group first
     regions: Mapping[str, int] = field(default_factory=dict)
+    # (f, 3 or 4) corners of the tagged facets, all of them on the boundary
     facets: Integers = field(default_factory=lambda: np.empty((0, 3), dtype=np.int64))
+    # (f,) tag of the face of each
     facet_tag: Tags = field(default_factory=lambda: np.empty(0, dtype=np.int32))
+    # name → tag in `facet_tag`; two names may share a face
     faces: Mapping[str, int] = field(default_factory=dict)
+    # volume group → further tags, of its cells that belong to other groups too
     overlaps: Mapping[str, Sequence[int]] = field(default_factory=dict)
-    remarks: Sequence[str] = ()
+    remarks: Sequence[str] = ()  # what the part's file holds and the link does not, a sentence each
 
     @property
     def shape(self) -> Cell:

@@ -29,17 +29,11 @@ _LISTED = 5  # concentrated masses, one by one
 
 @struct
 class PointMass:
-    """A concentrated mass, which a link can have on an interface, in the units of its file.
+    """A concentrated mass, which a link can have on an interface, in the units of its file."""
 
-    Attributes:
-        label: what the file calls it, and where.
-        mass: in the file's unit, kg where lengths are in m.
-        point: (3,) in the source's unit and axes.
-    """
-
-    label: str
-    mass: float
-    point: Array
+    label: str  # what the file calls it, and where
+    mass: float  # in the file's unit, kg where lengths are in m
+    point: Array  # (3,) in the source's unit and axes
 
 
 Groups = Iterable[tuple[str, Integers]]

@@ -12,12 +12,11 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError, SolveError
 from ...common.libraries import scipy
-from ...common.structs import struct
 from ...mbs._core import TimeFunction
 from ...mbs.analysis.forward import actuator_commands, command_ranges, largest_moments, strain_directions
 from ...mbs.linear.linearisation import LinearEquations
 from ...mbs.linear.statics import initial_state
-from ...mbs.model.amplifiers import Amplifiers, joined
+from ...mbs.model.amplifiers import joined
 from ...mbs.model.drives import Drives, PointDrive
 from ...mbs.model.gears import with_compliance
 from ...mbs.model.known_motion import State
@@ -26,7 +25,7 @@ from ...mbs.posture.start import undeformed_posture
 from ...mbs.quantities.settling import commanded_rest
 from ...mbs.run.context import place_of
 from ...mbs.run.drive import Control, drive_robot
-from ...mbs.run.gears import MotorCoordinates, with_motor_coordinates
+from ...mbs.run.gears import with_motor_coordinates
 from ...mbs.run.record import Run
 from ...mbs.run.replay import replay_times, supplied
 from ..context import ActuatedContext
@@ -38,28 +37,35 @@ from .margins import MOST, Feedback, Loops, eigenvalue_count, lowest_frequency
 from .metrics import LoopMotion, last_change
 from .observer import Observed, make_observed
 from .records import SampledAnalysis
-from .robot import ControlledRobot, Setup, default_tip, estimated_sensors, input_names, needed_sensors, whole_robot
+from .robot import Setup, default_tip, estimated_sensors, input_names, needed_sensors, whole_robot
 from .signals import Filter, Sensing, Signal, filters, make_signals, merged, readings_at
 
 APART = 1e-6  # of a run, between two times of a spline
 INSTANT = 1e-6  # of the sample time, before and after which commands are read where they change
 
 
-@struct
 class LoopTask:
     """What a closed loop is to do: the robot, the motion that it follows, signals of both, and limits. SI units."""
 
-    analysis: SampledAnalysis
-    context: ActuatedContext
-    source: Run  # the inverse analysis
-    plant: Model  # the robot without paths, with compliant gears
-    moved: MotorCoordinates  # motion of the source in coordinates of the plant
-    robot: ControlledRobot
-    sensing: Sensing  # of sensors, those that controllers need included
-    ideal: Sensing  # of what an observer estimates
-    tip: str  # "BODY.POINT" of the plant
-    amplifiers: Amplifiers
-    ranges: Array  # (2, inputs) limits of commands, N·m, N or V
+    def __init__(self, analysis: SampledAnalysis, context: ActuatedContext) -> None:
+        assert analysis.actuation is not None
+        self.analysis, self.context = analysis, context
+        self.source = source = context.outcomes[analysis.actuation]  # the inverse analysis
+        self.plant = plant = with_compliance(context.model.without_paths())
+        self.moved = with_motor_coordinates(source, plant)  # motion of the source in coordinates of the plant
+        self.robot = robot = whole_robot(context, source)
+        self.tip = place_of(context.whole, analysis.tip) or default_tip(plant)
+        signals = partial(make_signals, plant, context, whole=context.whole)
+        read, estimated = tuple(signals(analysis.sensor)), tuple[Signal, ...]()
+        if analysis.observer is None:
+            read = merged(read, signals(needed_sensors(robot, analysis.controller)))
+        else:
+            tip = analysis.tip or default_tip(robot.model)
+            estimated = merged(signals(estimated_sensors(robot, analysis.controller, tip)), ())
+        self.sensing, self.ideal = Sensing(plant, read), Sensing(plant, estimated)  # ideal: what an observer estimates
+        self.amplifiers, self.ranges = joined(context.patches.values()), command_ranges(context.model, context.patches)
+        if analysis.unlimited:
+            self.amplifiers, self.ranges = self.amplifiers.unlimited(), np.inf * np.sign(self.ranges)
 
 
 class ClosedLoop(SampledAnalysis):
@@ -79,9 +85,8 @@ class ClosedLoop(SampledAnalysis):
         The run's details are a `LoopRecord`. A run that diverges ends there and is kept. Raises `InputError` for
         controllers that do not fit the robot, `SolveError` where a user's function fails.
         """
-        task = _task(self, context)
-        outputs, place_at = replay_times(task.source, self), _place_of_tip(task)
-        models = loop_models(task)
+        task = LoopTask(self, context)
+        outputs, place_at, models = replay_times(task.source, self), _place_of_tip(task), loop_models(task)
         lowest = lowest_frequency(models, self.controller, self.sample_time, self.delay)
         times, rows = times_of_run(outputs, place_at, lowest)
         setup, wanted = _setup(task, outputs)
@@ -112,35 +117,6 @@ class ClosedLoop(SampledAnalysis):
             return replace(of, commanded=context.model.by_motor(held(of.time)), details=record)
 
         return replace(completed(run), look_closer=lambda: completed(closer))
-
-
-def _task(analysis: ClosedLoop, context: ActuatedContext) -> LoopTask:
-    assert analysis.actuation is not None
-    source = context.outcomes[analysis.actuation]
-    plant, robot = with_compliance(context.model.without_paths()), whole_robot(context, source)
-    signals = partial(make_signals, plant, context, whole=context.whole)
-    read, estimated = tuple(signals(analysis.sensor)), tuple[Signal, ...]()
-    if analysis.observer is None:
-        read = merged(read, signals(needed_sensors(robot, analysis.controller)))
-    else:
-        tip = analysis.tip or default_tip(robot.model)
-        estimated = merged(signals(estimated_sensors(robot, analysis.controller, tip)), ())
-    amplifiers, ranges = joined(context.patches.values()), command_ranges(context.model, context.patches)
-    if analysis.unlimited:
-        amplifiers, ranges = amplifiers.unlimited(), np.inf * np.sign(ranges)
-    return LoopTask(
-        analysis=analysis,
-        context=context,
-        source=source,
-        plant=plant,
-        moved=with_motor_coordinates(source, plant),
-        robot=robot,
-        sensing=Sensing(plant, read),
-        ideal=Sensing(plant, estimated),
-        tip=place_of(context.whole, analysis.tip) or default_tip(plant),
-        amplifiers=amplifiers,
-        ranges=ranges,
-    )
 
 
 def _setup(task: LoopTask, outputs: Array) -> tuple[Setup, Array]:

@@ -176,40 +176,26 @@ def measure(run: LoopMotion, setup: Setup, loop: Loop, lowest: float, is_stable:
 
 @struct
 class LoopRecord(Details):
-    """Samples, metrics, margins and advice of a closed loop.
+    """Samples, metrics, margins and advice of a closed loop."""
 
-    Attributes:
-        inputs, outputs: names of commands and readings.
-        time: (K,) s, of the samples taken.
-        readings: (K, outputs) in units of the sensors: rad, m, V and their rates.
-        reference: (K, outputs) readings on the reference motion.
-        commands: (K, inputs) within limits, N·m, N or V.
-        wanted: (K, inputs) before limits.
-        tip_error_peak_time: s, when the tip error is largest.
-        margins: by the linear model; None where controllers, or the robot, are not linear.
-        poles: eigenvalues (n,) of the linear loop at the start, from sample to sample.
-        advice: what to try, a text each, where the loop is not stable.
-        feedback: controllers as a linear law about the reference, by time (s): at the start, or along a schedule.
-        tip_error: (T,) m at the outputs of the run.
-        estimate: estimates of an observer; None without one.
-    """
-
+    # names of commands and readings
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    time: Array
-    readings: Array
-    reference: Array
-    commands: Array
-    wanted: Array
-    tip_error_peak_time: float
+    time: Array  # (K,) s, of the samples taken
+    readings: Array  # (K, outputs) in units of the sensors: rad, m, V and their rates
+    reference: Array  # (K, outputs) readings on the reference motion
+    commands: Array  # (K, inputs) within limits, N·m, N or V
+    wanted: Array  # (K, inputs) before limits
+    tip_error_peak_time: float  # s, when the tip error is largest
     metrics: Metrics
-    margins: Margins | None
-    poles: ComplexArray | None
+    margins: Margins | None  # by the linear model; None where controllers, or the robot, are not linear
+    poles: ComplexArray | None  # eigenvalues (n,) of the linear loop at the start, from sample to sample
     warnings: tuple[str, ...]
-    advice: tuple[str, ...] = ()
+    advice: tuple[str, ...] = ()  # what to try, a text each, where the loop is not stable
+    # controllers as a linear law about the reference, by time (s): at the start, or along a schedule
     feedback: Mapping[float, Feedback] = field(default_factory=dict)
-    tip_error: Array = field(default_factory=lambda: np.zeros(0))
-    estimate: Estimates | None = None
+    tip_error: Array = field(default_factory=lambda: np.zeros(0))  # (T,) m at the outputs of the run
+    estimate: Estimates | None = None  # estimates of an observer; None without one
 
 
 def between(times: Array, known: Array, values: Array) -> Array:

@@ -65,29 +65,17 @@ class Metrics:
 
 @struct
 class LoopMotion:
-    """Motion of a closed loop, at outputs and between; SI units.
+    """Motion of a closed loop, at outputs and between; SI units."""
 
-    Attributes:
-        time: (T,) s.
-        error: (T, d) m, of the tip from its place along d axes.
-        place_at: function from times (T,), s, to where the tip should be (T, d), m.
-        rates: (T, motors) of the joints, rad/s, m/s.
-        held: (T, inputs) commands in effect, N·m, N or V.
-        completed: whether the run reached its end.
-        is_disturbed: whether loads act that the reference does not know.
-        quiet: time from which the reference rests and loads stay constant, s.
-        length: size of the robot, m.
-    """
-
-    time: Array
-    error: Array
-    place_at: Callable[[Array], Array]
-    rates: Array
-    held: Array
-    completed: bool
-    is_disturbed: bool
-    quiet: float
-    length: float
+    time: Array  # (T,) s
+    error: Array  # (T, d) m, of the tip from its place along d axes
+    place_at: Callable[[Array], Array]  # function from times (T,), s, to where the tip should be (T, d), m
+    rates: Array  # (T, motors) of the joints, rad/s, m/s
+    held: Array  # (T, inputs) commands in effect, N·m, N or V
+    completed: bool  # whether the run reached its end
+    is_disturbed: bool  # whether loads act that the reference does not know
+    quiet: float  # time from which the reference rests and loads stay constant, s
+    length: float  # size of the robot, m
 
 
 def ringing(time: Array, place: Array, lowest: float) -> tuple[float, float]:

@@ -243,28 +243,18 @@ class Schedule:
 
 @struct
 class Estimates:
-    """Estimates at K samples, and tip error against the true motion.
-
-    Attributes:
-        values: (K, names) estimates, SI units.
-        tip: point "BODY.POINT".
-        position: (K, d) m, estimated position of the tip.
-        error: (K,) m, distance of this from the true position.
-        sigma: (K, d) m, standard deviations by the covariance of the filter.
-        nees: mean of eᵀ Σ⁻¹ e over the number of axes, e the error of the position; 1 if the covariance Σ is right.
-        inside: part of the errors within ±2σ, 0.95 if the covariance is right.
-        poles: (n,) eigenvalues of the estimation error, from sample to sample, at the start.
-    """
+    """Estimates at K samples, and tip error against the true motion."""
 
     names: tuple[str, ...]
-    values: Array
-    tip: str
-    position: Array
-    error: Array
-    sigma: Array
+    values: Array  # (K, names) estimates, SI units
+    tip: str  # point "BODY.POINT"
+    position: Array  # (K, d) m, estimated position of the tip
+    error: Array  # (K,) m, distance of this from the true position
+    sigma: Array  # (K, d) m, standard deviations by the covariance of the filter
+    # mean of eᵀ Σ⁻¹ e over the number of axes, e the error of the position; 1 if the covariance Σ is right
     nees: float
-    inside: float
-    poles: ComplexArray
+    inside: float  # part of the errors within ±2σ, 0.95 if the covariance is right
+    poles: ComplexArray  # (n,) eigenvalues of the estimation error, from sample to sample, at the start
 
 
 class Observed:

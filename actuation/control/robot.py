@@ -279,25 +279,17 @@ def default_tip(model: Model) -> str:
 
 @struct
 class Setup:
-    """Data for making a controller; SI units.
-
-    Attributes:
-        inputs, outputs: names of commands (torques N·m or N, voltages V) and readings, as `Signal` has them.
-        times: (K,) of the samples, s.
-        sample_time: s.
-        delay: s, after which a command acts.
-        reference: (K, outputs) readings on the motion of the robot.
-        feed_forward: (K, inputs) commands to which those of controllers are added.
-    """
+    """Data for making a controller; SI units."""
 
     robot: ControlledRobot
+    # names of commands (torques N·m or N, voltages V) and readings, as `Signal` has them
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    times: Array
-    sample_time: float
-    delay: float
-    reference: Array
-    feed_forward: Array
+    times: Array  # (K,) of the samples, s
+    sample_time: float  # s
+    delay: float  # s, after which a command acts
+    reference: Array  # (K, outputs) readings on the motion of the robot
+    feed_forward: Array  # (K, inputs) commands to which those of controllers are added
 
     def robot_coordinates(self, joints: Iterable[str]) -> Iterator[tuple[str, str]]:
         """Yield each joint with the name of each of its coordinates: "NAME", or "NAME 1", "NAME 2"."""

@@ -247,23 +247,18 @@ STEP = 0.1  # of the extent, from one station to the next; less is a taper
 
 
 class Effects(NamedTuple):
-    """Effects of k patches on the n modes of a modal body.
+    """Effects of k patches on the n modes of a modal body."""
 
-    Attributes:
-        extent: (k,) t_b, mean extent of the link along the normal under each patch, m: see `LinkSections.extent`.
-        per_volt: (k,) c, load along the strain that each patch actuates, N·m/V.
-        lever: (k,) strain of the surface per curvature and distance: 1; of diagonals per twist: β/2, see `place_of`.
-        turn: (k, n) rotation of the sections at the ends of a patch against each other, in its sense, rad/(m·√kg).
-        Phi_V: (k, n) modal forces per volt, N/(√kg·V), reduced by the stiffness of the layers.
-        capacitance: (k, K) charges, F, as sensors by voltages of the K patches of the link; open ones are clamped, but
-            for the strains that modes lack.
-    """
-
+    # (k,) t_b, mean extent of the link along the normal under each patch, m: see `LinkSections.extent`
     extent: Array
-    per_volt: Array
+    per_volt: Array  # (k,) c, load along the strain that each patch actuates, N·m/V
+    # (k,) strain of the surface per curvature and distance: 1; of diagonals per twist: β/2, see `place_of`
     lever: Array
+    # (k, n) rotation of the sections at the ends of a patch against each other, in its sense, rad/(m·√kg)
     turn: Array
-    Phi_V: Array
+    Phi_V: Array  # (k, n) modal forces per volt, N/(√kg·V), reduced by the stiffness of the layers
+    # (k, K) charges, F, as sensors by voltages of the K patches of the link; open ones are clamped, but for the strains
+    # that modes lack
     capacitance: Array
 
 
@@ -391,17 +386,11 @@ PASSES = 6  # until modes and the stiffness of shunts at their frequencies agree
 
 @struct
 class StructureEffect:
-    """Properties of a link, each first bare, then with patches.
+    """Properties of a link, each first bare, then with patches."""
 
-    Attributes:
-        mass: (2,) kg.
-        inertia: (2,) about the body's z axis, kg·m².
-        frequency: (2, n) Hz.
-    """
-
-    mass: Array
-    inertia: Array
-    frequency: Array
+    mass: Array  # (2,) kg
+    inertia: Array  # (2,) about the body's z axis, kg·m²
+    frequency: Array  # (2, n) Hz
 
 
 def patched_body(spatial: Body, body: ModalBody, placed: Sequence[PlacedLayout]) -> Body:

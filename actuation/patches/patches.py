@@ -28,20 +28,14 @@ ENERGY_WEIGHT = 1e-4  # of the strain energy rᵀ K⁻¹ r beside weights of poi
 
 @struct
 class ReachedModes:
-    """Modes of the families that patches excite, among n modes of a link, in coordinates p' that decouple them.
+    """Modes of the families that patches excite, among n modes of a link, in coordinates p' that decouple them."""
 
-    Attributes:
-        rows: (m,) numbers (from 0) of the modes of the modal body in these families.
-        T: (m, m) p of these modes from p', without unit: m_ff is the identity and K_ff diagonal; (m, fewer) where
-            equations keep fewer, see `link_patches.on_kept_modes`.
-        stiffness: (m,) of the p', rad²/s².
-        served: number of the p', the first ones, that are no attachment modes.
-    """
-
-    rows: Indices
+    rows: Indices  # (m,) numbers (from 0) of the modes of the modal body in these families
+    # (m, m) p of these modes from p', without unit: m_ff is the identity and K_ff diagonal; (m, fewer) where equations
+    # keep fewer, see `link_patches.on_kept_modes`
     T: Array
-    stiffness: Array
-    served: int
+    stiffness: Array  # (m,) of the p', rad²/s²
+    served: int  # number of the p', the first ones, that are no attachment modes
 
     def forces(self, F_p: Array) -> Array:
         """Return modal forces (T, m), N/√kg, on p' from those (T, n) of the body; or other derivatives by modes."""
@@ -54,18 +48,12 @@ class ReachedModes:
 
 @struct
 class Reach:
-    """Modal forces of k patches on n modes, and the weights of the modes.
-
-    Attributes:
-        Phi_V: (n, k) modal forces per volt, N/(√kg·V).
-        amplifiers: of the k patches.
-        W_sqrt: (rows, n) weights: least squares minimize |W_sqrt r|² of the unmet modal forces r.
-    """
+    """Modal forces of k patches on n modes, and the weights of the modes."""
 
     modes: ReachedModes
-    Phi_V: Array
-    amplifiers: Amplifiers
-    W_sqrt: Array
+    Phi_V: Array  # (n, k) modal forces per volt, N/(√kg·V)
+    amplifiers: Amplifiers  # of the k patches
+    W_sqrt: Array  # (rows, n) weights: least squares minimize |W_sqrt r|² of the unmet modal forces r
 
     @property
     def served(self) -> int:
@@ -158,19 +146,13 @@ def _modes_of(families: frozenset[Family], body: ModalBody, spatial: Body) -> Re
 
 @struct
 class Voltages:
-    """Voltages of patches over time.
+    """Voltages of patches over time."""
 
-    Attributes:
-        required: (T, k) V, with no limit; of least size or least residual where patches and modes differ in number.
-        within_limit: (T, k) V, the best within the limits of the patches.
-        unmet: (T, n) N/√kg, modal forces that `within_limit` leaves.
-        served: number of modes, the first ones, that the patches are to serve.
-    """
-
+    # (T, k) V, with no limit; of least size or least residual where patches and modes differ in number
     required: Array
-    within_limit: Array
-    unmet: Array
-    served: int
+    within_limit: Array  # (T, k) V, the best within the limits of the patches
+    unmet: Array  # (T, n) N/√kg, modal forces that `within_limit` leaves
+    served: int  # number of modes, the first ones, that the patches are to serve
 
     def at(self, rows: Indices) -> Voltages:
         """Return the voltages at some outputs alone, by their indices (k,)."""
@@ -222,21 +204,14 @@ def solve_voltages(patches: Reach, F_p: Array) -> Voltages:
 
 @struct
 class PatchArray(Reach):
-    """The patches of one layout.
+    """The patches of one layout."""
 
-    Attributes:
-        layout: the keys of the scene.
-        edges: (k, 2) where each patch begins and ends along the link, m.
-        effects: effects on the modes of the `link`.
-        turn: (n, k) rotation of the ends of each patch against each other by the n `modes`, rad/(m·√kg).
-        link: modal body of the link.
-    """
-
-    layout: PztLayout
-    edges: Array
-    effects: Effects
+    layout: PztLayout  # the keys of the scene
+    edges: Array  # (k, 2) where each patch begins and ends along the link, m
+    effects: Effects  # effects on the modes of the `link`
+    # (n, k) rotation of the ends of each patch against each other by the n `modes`, rad/(m·√kg)
     turn: Array
-    link: ModalBody
+    link: ModalBody  # modal body of the link
 
     @property
     def moment_per_volt(self) -> Array:

@@ -29,22 +29,15 @@ ROUND = 1e-6  # of the radius: corners of an outline that are so far from the ax
 
 @struct
 class LinkSections:
-    """Section properties of a link from each of its k stations on; NaN if unknown.
+    """Section properties of a link from each of its k stations on; NaN if unknown."""
 
-    Attributes:
-        x: (k,) m from the root.
-        height, width: (k,) along y and z, m.
-        is_round: (k,) whether a circle bounds the section.
-        rigidity: (k, 4) of the strains e: EI in plane, EA, GJ, EI out of plane, N·m² and N.
-        middle: (k, 2) between the faces along y and z, from the axis, m.
-    """
-
-    x: Array
+    x: Array  # (k,) m from the root
+    # (k,) along y and z, m
     height: Array
     width: Array
-    is_round: Array
-    rigidity: Array
-    middle: Array
+    is_round: Array  # (k,) whether a circle bounds the section
+    rigidity: Array  # (k, 4) of the strains e: EI in plane, EA, GJ, EI out of plane, N·m² and N
+    middle: Array  # (k, 2) between the faces along y and z, from the axis, m
 
     def extent(self, normal: Literal["y", "z"], side: float = 0.0) -> Array:
         """Return extents (k,) along a normal, m; for `side` ±1, twice the distance of that face from the axis."""

@@ -16,23 +16,14 @@ LEVI_CIVITA = np.array([[[(a - b) * (b - c) * (c - a) / 2 for c in range(3)] for
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Integrals:
-    """Inertia shape integrals of a link over its volume, in its axes (docs/theory.md; Shabana, ch. 5); n modes.
+    """Inertia shape integrals of a link over its volume, in its axes (docs/theory.md; Shabana, ch. 5); n modes."""
 
-    Attributes:
-        mass: m in kg.
-        first_moment: (3,) ∫ρ x dV in kg·m.
-        second_moment: (3, 3) ∫ρ x xᵀ dV in kg·m².
-        S_bar: (3, n) ∫ρ Φ dV in √kg.
-        I_bar: (3, 3, n) ∫ρ x_k Φ_l dV at [k, l] in m·√kg.
-        S_bar_kl: (3, 3, n, n) ∫ρ Φ_kᵀ Φ_l dV at [k, l].
-    """
-
-    mass: float
-    first_moment: Array
-    second_moment: Array
-    S_bar: Array
-    I_bar: Array
-    S_bar_kl: Array
+    mass: float  # m in kg
+    first_moment: Array  # (3,) ∫ρ x dV in kg·m
+    second_moment: Array  # (3, 3) ∫ρ x xᵀ dV in kg·m²
+    S_bar: Array  # (3, n) ∫ρ Φ dV in √kg
+    I_bar: Array  # (3, 3, n) ∫ρ x_k Φ_l dV at [k, l] in m·√kg
+    S_bar_kl: Array  # (3, 3, n, n) ∫ρ Φ_kᵀ Φ_l dV at [k, l]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -76,18 +67,12 @@ def _frozen(value: object) -> object:
 
 @struct
 class Interface(Frozen):
-    """Modes at one point of the axis, in the link's frame; SI units.
+    """Modes at one point of the axis, in the link's frame; SI units."""
 
-    Attributes:
-        position: (3,) in m, undeformed.
-        translation: (3, n) displacement of mode l in column l, in m per unit of its modal coordinate.
-        rotation: (3, n) small rotation of the cross section, in rad per unit of modal coordinate.
-        coupling: of a solid's face, "mean" or "rigid": its mean moves so, or all of it; empty where nothing says so.
-    """
-
-    position: Array
-    translation: Array
-    rotation: Array
+    position: Array  # (3,) in m, undeformed
+    translation: Array  # (3, n) displacement of mode l in column l, in m per unit of its modal coordinate
+    rotation: Array  # (3, n) small rotation of the cross section, in rad per unit of modal coordinate
+    # of a solid's face, "mean" or "rigid": its mean moves so, or all of it; empty where nothing says so
     coupling: str = ""
 
     @property
@@ -98,69 +83,48 @@ class Interface(Frozen):
 
 @struct
 class Stations(Frozen):
-    """Points along the axis, ascending in x, at which the modes are known; SI units.
+    """Points along the axis, ascending in x, at which the modes are known; SI units."""
 
-    Attributes:
-        position: (k, 3) in m.
-        translation: (k, 3, n), as in `Interface`.
-        rotation: (k, 3, n), as in `Interface`.
-        height: (k,) extent of the cross section along y in m; height[i] holds from station i up to station i + 1 (of a
-            taper, the height in the middle between the two).
-        element: (e, 4) the stations on which each element's shapes are cubics, ascending; None where not known.
-        outline: (k, q, 2) corners (y, z) of a beam's section in m, for pictures; holds as `height` does; None where not
-            known.
-        rigidity: (k, 2) EA in N and EI in N·m² of in-plane bending; holds as `height` does; None where not known.
-        width: (k,) extent along z in m, likewise.
-        out_of_plane_rigidity: (k,) EI in N·m² of bending along z, likewise.
-        torsional_rigidity: (k,) GJ in N·m², likewise.
-        middle: (k, 2) middle of the extents along y and z, from the axis, in m, likewise; None where it is on the axis.
-    """
-
-    position: Array
-    translation: Array
-    rotation: Array
+    position: Array  # (k, 3) in m
+    translation: Array  # (k, 3, n), as in `Interface`
+    rotation: Array  # (k, 3, n), as in `Interface`
+    # (k,) extent of the cross section along y in m; height[i] holds from station i up to station i + 1 (of a taper, the
+    # height in the middle between the two)
     height: Array
+    # (e, 4) the stations on which each element's shapes are cubics, ascending; None where not known
     element: Integers | None = None
+    # (k, q, 2) corners (y, z) of a beam's section in m, for pictures; holds as `height` does; None where not known
     outline: Array | None = None
+    # (k, 2) EA in N and EI in N·m² of in-plane bending; holds as `height` does; None where not known
     rigidity: Array | None = None
-    width: Array | None = None
-    out_of_plane_rigidity: Array | None = None
-    torsional_rigidity: Array | None = None
+    width: Array | None = None  # (k,) extent along z in m, likewise
+    out_of_plane_rigidity: Array | None = None  # (k,) EI in N·m² of bending along z, likewise
+    torsional_rigidity: Array | None = None  # (k,) GJ in N·m², likewise
+    # (k, 2) middle of the extents along y and z, from the axis, in m, likewise; None where it is on the axis
     middle: Array | None = None
 
 
 @struct
 class PictureMesh(Frozen):
-    """Mesh of the link for pictures, with its mode shapes; SI units.
+    """Mesh of the link for pictures, with its mode shapes; SI units."""
 
-    Attributes:
-        points: (p, 3) in m.
-        cells: (c, v) points of each cell.
-        mode_shapes: (p, 3, n) displacement in m per unit of modal coordinate.
-        edges: (e, 2) points of the edges of finite elements, where `cells` divide these for a smooth picture.
-    """
-
-    points: Array
-    cells: Integers
-    mode_shapes: Array
+    points: Array  # (p, 3) in m
+    cells: Integers  # (c, v) points of each cell
+    mode_shapes: Array  # (p, 3, n) displacement in m per unit of modal coordinate
+    # (e, 2) points of the edges of finite elements, where `cells` divide these for a smooth picture
     edges: Integers | None = None
 
 
 @struct
 class StressPoint(Frozen):
-    """Stress and strain at one point of the link, in the link's frame; rows xx, yy, zz, yz, xz, xy.
+    """Stress and strain at one point of the link, in the link's frame; rows xx, yy, zz, yz, xz, xy."""
 
-    Attributes:
-        position: (3,) in m, undeformed.
-        stress: (6, n) in Pa per unit of modal coordinate.
-        strain: (6, n) per unit of modal coordinate; shear strains are 2ε_yz, 2ε_xz, 2ε_xy, so that stress = C strain.
-        static: (6, l) in Pa per unit of each load in `ModalBody.stress_loads`, of the link under its reference
-            condition; None where not known.
-    """
-
-    position: Array
-    stress: Array
+    position: Array  # (3,) in m, undeformed
+    stress: Array  # (6, n) in Pa per unit of modal coordinate
+    # (6, n) per unit of modal coordinate; shear strains are 2ε_yz, 2ε_xz, 2ε_xy, so that stress = C strain
     strain: Array
+    # (6, l) in Pa per unit of each load in `ModalBody.stress_loads`, of the link under its reference condition; None
+    # where not known
     static: Array | None = None
 
 
@@ -182,21 +146,15 @@ class MeasuredValues(Frozen):
 
 @struct
 class OutlinedPatches(Frozen):
-    """Piezoelectric patches whose outlines, m, are edges of the mesh, on the faces at largest (top) and smallest y.
+    """Piezoelectric patches whose outlines, m, are edges of the mesh, on the faces at largest (top) and smallest y."""
 
-    Attributes:
-        edges: (k, 2) begin and end of each patch, m from the root.
-        width: along z, in m.
-        top: (k, n) ∫ t·ε(Φ)t ds over each patch, with t the link's direction: modal forces per unit of membrane force
-            (N/m, positive in tension), in m² per unit of modal coordinate; None where no patches are on that face.
-        bottom: (k, n) likewise.
-        top_across, bottom_across: (k, n) the same of the strain across, ∫ ε_zz(Φ) ds; None in earlier files, too.
-    """
-
-    edges: Array
-    width: float
+    edges: Array  # (k, 2) begin and end of each patch, m from the root
+    width: float  # along z, in m
+    # (k, n) ∫ t·ε(Φ)t ds over each patch, with t the link's direction: modal forces per unit of membrane force (N/m,
+    # positive in tension), in m² per unit of modal coordinate; None where no patches are on that face
     top: Array | None = None
-    bottom: Array | None = None
+    bottom: Array | None = None  # (k, n) likewise
+    # (k, n) the same of the strain across, ∫ ε_zz(Φ) ds; None in earlier files, too
     top_across: Array | None = None
     bottom_across: Array | None = None
 

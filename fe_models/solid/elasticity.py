@@ -29,17 +29,11 @@ AnyMaterial = Material | OrthotropicMaterial
 
 @struct
 class MaterialMap:
-    """Material of each cell of this rank, ghosts included.
+    """Material of each cell of this rank, ghosts included."""
 
-    Attributes:
-        C: (r, 6, 6) stiffness of each material, as in `constitutive.stiffness`.
-        density: (r,) in kg/m³.
-        of_cell: (c,) row of `C` and `density`.
-    """
-
-    C: Array
-    density: Array
-    of_cell: Integers
+    C: Array  # (r, 6, 6) stiffness of each material, as in `constitutive.stiffness`
+    density: Array  # (r,) in kg/m³
+    of_cell: Integers  # (c,) row of `C` and `density`
 
 
 @struct

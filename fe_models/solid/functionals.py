@@ -29,27 +29,17 @@ from .elasticity import SolidModel
 
 @struct
 class Averages:
-    """Mean motion of k plane figures: faces, or cross sections.
+    """Mean motion of k plane figures: faces, or cross sections."""
 
-    Attributes:
-        weights: (4k, owned + ghosts) this rank's part of ∫N_a ds, ∫x N_a ds, ∫y N_a ds, ∫z N_a ds of each figure.
-        area: (k,) in m².
-        centroid: (k, 3) in m.
-        inertia: (k, 3, 3) J about the centroid in m⁴.
-        height: (k,) extent along y in m.
-        width: (k,) extent along z in m.
-        middle: (k, 2) middle of these extents, along y and z from the centroid, in m.
-        density: (k,) mean density in kg/m³.
-    """
-
+    # (4k, owned + ghosts) this rank's part of ∫N_a ds, ∫x N_a ds, ∫y N_a ds, ∫z N_a ds of each figure
     weights: sp.csr_matrix
-    area: Array
-    centroid: Array
-    inertia: Array
-    height: Array
-    width: Array
-    middle: Array
-    density: Array
+    area: Array  # (k,) in m²
+    centroid: Array  # (k, 3) in m
+    inertia: Array  # (k, 3, 3) J about the centroid in m⁴
+    height: Array  # (k,) extent along y in m
+    width: Array  # (k,) extent along z in m
+    middle: Array  # (k, 2) middle of these extents, along y and z from the centroid, in m
+    density: Array  # (k,) mean density in kg/m³
 
     def of(self, model: SolidModel, modes: Array) -> tuple[Array, Array]:
         """Return mean translation, m, and rotation, rad, (k, 3, n) each, of `modes` (3 owned, n); collective."""

@@ -126,19 +126,12 @@ def _new_folder() -> Path | None:
 
 @struct
 class RigidFace:
-    """A face that moves as a plate; SI units.
+    """A face that moves as a plate; SI units."""
 
-    Attributes:
-        name: of the interface.
-        nodes: (f,) its nodes among this rank's own.
-        centroid: (3,) in m.
-        free: which of its translations (0 … 2) and rotations (3 … 5) no support fixes.
-    """
-
-    name: str
-    nodes: Integers
-    centroid: Array
-    free: Sequence[int]
+    name: str  # of the interface
+    nodes: Integers  # (f,) its nodes among this rank's own
+    centroid: Array  # (3,) in m
+    free: Sequence[int]  # which of its translations (0 … 2) and rotations (3 … 5) no support fixes
 
 
 class Flexibility:

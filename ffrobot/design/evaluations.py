@@ -255,26 +255,19 @@ CLOSED = 1e-2  # of the gradient at an optimum: largest `gap` there
 
 @dataclass(frozen=True)
 class Optimality:
-    """Conditions of optimality (Karush, Kuhn, Tucker) at one design, in the scaled problem.
+    """Conditions of optimality (Karush, Kuhn, Tucker) at one design, in the scaled problem."""
 
-    Attributes:
-        limits: (m) multipliers λ of limits, no unit; NaN for limits that are not reached.
-        bounds: (n) multipliers μ of bounds, no unit, negative for lower ones; NaN for numbers between their bounds.
-        residual: largest entry of the gradient of the Lagrangian: relative change of the objective over the range of
-            one number, if all were linear.
-        gradient_error: largest estimated error in the gradient of the objective, in the same measure.
-        gap: relative decrease of the objective, if all were linear, by a move to the limits that are almost reached.
-        violation: largest excess, relative to its limit.
-        kinks: notes on peaks that others exceed close to the design.
-    """
-
-    limits: Array
+    limits: Array  # (m) multipliers λ of limits, no unit; NaN for limits that are not reached
+    # (n) multipliers μ of bounds, no unit, negative for lower ones; NaN for numbers between their bounds
     bounds: Array
+    # largest entry of the gradient of the Lagrangian: relative change of the objective over the range of one number, if
+    # all were linear
     residual: float
+    # relative decrease of the objective, if all were linear, by a move to the limits that are almost reached
     gap: float
-    gradient_error: float
-    violation: float
-    kinks: tuple[str, ...]
+    gradient_error: float  # largest estimated error in the gradient of the objective, in the same measure
+    violation: float  # largest excess, relative to its limit
+    kinks: tuple[str, ...]  # notes on peaks that others exceed close to the design
 
     def reached(self, aim: float) -> bool:
         """Whether this is an optimum: `residual` is at most `aim`, and limits are satisfied."""

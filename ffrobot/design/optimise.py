@@ -159,20 +159,14 @@ def _search(
 
 @dataclass(frozen=True, kw_only=True)
 class FrontPoint(Local):
-    """A point of a Pareto front: the best design for one limit of the second response.
+    """A point of a Pareto front: the best design for one limit of the second response."""
 
-    Attributes:
-        point: values of the keys.
-        response, against: values of the first and second response, in `units` of the front.
-        price: ∂response/∂against along the front; NaN at its ends.
-        feasible: whether the design satisfies all limits.
-    """
-
-    point: tuple[object, ...]
+    point: tuple[object, ...]  # values of the keys
+    # values of the first and second response, in `units` of the front
     response: float
     against: float
-    price: float
-    feasible: bool
+    price: float  # ∂response/∂against along the front; NaN at its ends
+    feasible: bool  # whether the design satisfies all limits
 
 
 @dataclass(frozen=True, kw_only=True)

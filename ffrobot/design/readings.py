@@ -22,30 +22,22 @@ from ..sweep.runs import by_dots, is_vector
 
 @dataclass(frozen=True)
 class Reading:
-    """Value of a response in some results; of a peak also its time and column.
+    """Value of a response in some results; of a peak also its time and column."""
 
-    Attributes:
-        value: value in `unit`, which is empty if it is unknown.
-        time: time of a peak, s; NaN for other responses.
-        edge: "first" or "last" if the peak is at an end of the run, which may move.
-        column, sign: column of the history with the peak, and sign of the value there.
-        mode: family of a frequency's mode, and number in the family.
-        coarse: value of a peak by every second output; NaN for other responses.
-        missed_by: value by outputs alone of a peak or mean that lies between outputs; NaN otherwise.
-        doubt: reason why the value is uncertain, or empty.
-        elsewhere: text on the largest value, if it is another peak than the followed one; otherwise empty.
-    """
-
-    value: float
+    value: float  # value in `unit`, which is empty if it is unknown
     unit: str = ""
-    time: float = np.nan
+    time: float = np.nan  # time of a peak, s; NaN for other responses
+    # "first" or "last" if the peak is at an end of the run, which may move
     edge: Literal["", "first", "last"] = ""
+    # column of the history with the peak, and sign of the value there
     column: int = 0
     sign: float = 1.0
-    mode: str = ""
-    coarse: float = np.nan
+    mode: str = ""  # family of a frequency's mode, and number in the family
+    coarse: float = np.nan  # value of a peak by every second output; NaN for other responses
+    # value by outputs alone of a peak or mean that lies between outputs; NaN otherwise
     missed_by: float = np.nan
-    doubt: str = ""
+    doubt: str = ""  # reason why the value is uncertain, or empty
+    # text on the largest value, if it is another peak than the followed one; otherwise empty
     elsewhere: str = ""
 
     def in_words(self, digits: int = 6) -> str:

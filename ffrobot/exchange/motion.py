@@ -30,21 +30,14 @@ Side = Literal["motor", "joint"]
 
 @struct
 class JointMotion:
-    """One coordinate of a joint over T outputs; SI units.
+    """One coordinate of a joint over T outputs; SI units."""
 
-    Attributes:
-        name: name of the joint; "NAME[k]" of coordinate k where it has several.
-        coordinate: (T,) rad or m.
-        rate: (T,) rad/s or m/s.
-        moment: (T,) torque or force of the motor at the joint, N·m or N; None without motor.
-        motor: datasets (T,) in results: `motor_coordinate`, `motor_rate` (rad or m, 1/s) of a compliant gear,
-            `motor_moment` (N·m or N) of one with a rotor.
-    """
-
-    name: str
-    coordinate: Array
-    rate: Array
-    moment: Array | None
+    name: str  # name of the joint; "NAME[k]" of coordinate k where it has several
+    coordinate: Array  # (T,) rad or m
+    rate: Array  # (T,) rad/s or m/s
+    moment: Array | None  # (T,) torque or force of the motor at the joint, N·m or N; None without motor
+    # datasets (T,) in results: `motor_coordinate`, `motor_rate` (rad or m, 1/s) of a compliant gear, `motor_moment`
+    # (N·m or N) of one with a rotor
     motor: Mapping[str, Array] = field(default_factory=dict)
 
     def on(self, side: Side) -> tuple[Array, Array]:

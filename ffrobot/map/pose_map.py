@@ -96,24 +96,16 @@ STATUS = ("found", "out of reach", "outside joint limits", "no equilibrium")
 
 @dataclass(frozen=True)
 class MapPlan:
-    """Settings of a map of a scene over the grid of `axes`, with its folder.
-
-    Attributes:
-        point: "BODY.POINT" whose stiffness is mapped, and whose positions a grid over x, y, z has.
-        keeps_orientation: whether the body of the point keeps the orientation of the start.
-        count: number of natural frequencies in each pose.
-        frequencies: (F,) of the frequency response, Hz.
-        milling: process whose stable depths are mapped.
-    """
+    """Settings of a map of a scene over the grid of `axes`, with its folder."""
 
     scene: Path
     axes: tuple[GridAxis, ...]
-    point: str
-    keeps_orientation: bool
-    count: int
-    frequencies: Array
+    point: str  # "BODY.POINT" whose stiffness is mapped, and whose positions a grid over x, y, z has
+    keeps_orientation: bool  # whether the body of the point keeps the orientation of the start
+    count: int  # number of natural frequencies in each pose
+    frequencies: Array  # (F,) of the frequency response, Hz
     folder: Path
-    milling: Milling | None = None
+    milling: Milling | None = None  # process whose stable depths are mapped
 
     @property
     def shape(self) -> tuple[int, ...]:

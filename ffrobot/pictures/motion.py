@@ -23,27 +23,18 @@ VISIBLE_DEFORMATION, INVISIBLE = 0.05, 1e-3  # of the mechanism's size
 
 @struct
 class MovingBody:
-    """Motion of a body with k points at T outputs, in global axes unless stated otherwise.
-
-    Attributes:
-        position: (T, 3) R, origin of its frame, m.
-        orientation: (T, 4) quaternions of its frame, scalar first.
-        modal: (T, n) modal coordinates p, m·√kg; None for a rigid body.
-        point_names: names of the points, as in results: `link2.tip`; in the order of x.
-        points: (k, 3) undeformed positions of the points in the frame, m.
-        deflection: (T, k, 3) deflections Φ p of the points in the frame, m.
-        sections: (T, k, 4) quaternions of the sections there; (T, 0, 4) in planar scenes, whose files have none.
-        shift: (T, 3) displacement of the body per unit of exaggeration s, which keeps joints closed, m; global axes.
-    """
+    """Motion of a body with k points at T outputs, in global axes unless stated otherwise."""
 
     name: str
-    position: Array
-    orientation: Array
-    modal: Array | None
-    point_names: tuple[str, ...]
-    points: Array
-    deflection: Array
+    position: Array  # (T, 3) R, origin of its frame, m
+    orientation: Array  # (T, 4) quaternions of its frame, scalar first
+    modal: Array | None  # (T, n) modal coordinates p, m·√kg; None for a rigid body
+    point_names: tuple[str, ...]  # names of the points, as in results: `link2.tip`; in the order of x
+    points: Array  # (k, 3) undeformed positions of the points in the frame, m
+    deflection: Array  # (T, k, 3) deflections Φ p of the points in the frame, m
+    # (T, k, 4) quaternions of the sections there; (T, 0, 4) in planar scenes, whose files have none
     sections: Array
+    # (T, 3) displacement of the body per unit of exaggeration s, which keeps joints closed, m; global axes
     shift: Array
 
     @property

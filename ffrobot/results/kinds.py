@@ -297,16 +297,13 @@ def _nothing(*_: object) -> str:
 
 @struct
 class OwnResults:
-    """How results that only one kind of analysis has are written and judged.
+    """How results that only one kind of analysis has are written and judged."""
 
-    Attributes:
-        part: name of their group in the group of the analysis; "" without one. Its attribute `advice` names remedies.
-        write: writes the details of a run to the group of its analysis.
-        answer: text of the verdict by the attributes of `part`, in place of whether motors and patches suffice.
-    """
-
+    # name of their group in the group of the analysis; "" without one. Its attribute `advice` names remedies
     part: str = ""
+    # writes the details of a run to the group of its analysis
     write: Callable[[h5py.Group, Run, Any], object] = _nothing
+    # text of the verdict by the attributes of `part`, in place of whether motors and patches suffice
     answer: Callable[[About], str] = _nothing
 
     def about(self, group: h5py.Group) -> About:

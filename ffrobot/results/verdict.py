@@ -27,17 +27,14 @@ def millimeters(value: float, digits: int = 4) -> str:
 
 @struct
 class ToolError:
-    """Largest distance (m) of a point from its path in an analysis; None where there is no path.
+    """Largest distance (m) of a point from its path in an analysis; None where there is no path."""
 
-    Attributes:
-        controlled: with joints position-controlled on the computed angles, or in a closed loop; of analyses that
-            prescribe the path and have actuators for it, the error of the computation.
-        open_loop: with the computed torques open loop; without a replay an estimate for the first vibration.
-        growth: 1/s, rate at which deviations grow under these torques; 0 where stable or not known.
-    """
-
+    # with joints position-controlled on the computed angles, or in a closed loop; of analyses that prescribe the path
+    # and have actuators for it, the error of the computation
     controlled: float | None = None
+    # with the computed torques open loop; without a replay an estimate for the first vibration
     open_loop: float | None = None
+    # 1/s, rate at which deviations grow under these torques; 0 where stable or not known
     growth: float = 0.0
 
 

@@ -36,17 +36,12 @@ JUMPS, BETWEEN = 100, 0.381966  # parts that may miss more; where in parts that 
 
 @struct
 class Actuation:
-    """Requirements of an analysis on motors and patches.
+    """Requirements of an analysis on motors and patches."""
 
-    Attributes:
-        voltages: of patches, by layout ([[pzt]]).
-        unmet: (T, n) N/√kg, by body with patches: forces on modes of its file that no voltage within limits supplies.
-        feasibility: whether motors and patches keep their limits.
-    """
-
-    voltages: Mapping[str, Voltages]
+    voltages: Mapping[str, Voltages]  # of patches, by layout ([[pzt]])
+    # (T, n) N/√kg, by body with patches: forces on modes of its file that no voltage within limits supplies
     unmet: Mapping[str, Array]
-    feasibility: Feasibility
+    feasibility: Feasibility  # whether motors and patches keep their limits
 
     def at(self, rows: Indices) -> Actuation:
         """Voltages and forces at the outputs with numbers `rows` alone; the feasibility stays that of all outputs."""

@@ -29,26 +29,19 @@ if TYPE_CHECKING:
 
 @struct
 class LoadedBody:
-    """A body of the scene.
-
-    Attributes:
-        spatial: its equations in space, in which payloads with inertia on links are bodies of their own.
-        carrying: the same with these payloads at small rotations: its modes are those of the loaded link.
-        structure: change of mass and stiffness by patches; None without any.
-        modal, path: its modal body and the file of that, None where it is rigid.
-        computed: whether stage 1 ran for it.
-        reused: "modes" or "mesh" that it took from an earlier run, or empty.
-        motions: families of motion (bending, torsion, axial) that the scene can require of a link.
-    """
+    """A body of the scene."""
 
     _: KW_ONLY
-    spatial: Body
+    spatial: Body  # its equations in space, in which payloads with inertia on links are bodies of their own
+    # the same with these payloads at small rotations: its modes are those of the loaded link
     carrying: Body
-    structure: StructureEffect | None = None
+    structure: StructureEffect | None = None  # change of mass and stiffness by patches; None without any
+    # its modal body and the file of that, None where it is rigid
     modal: ModalBody | None = None
     path: Path | None = None
-    computed: bool = False
-    reused: str = ""
+    computed: bool = False  # whether stage 1 ran for it
+    reused: str = ""  # "modes" or "mesh" that it took from an earlier run, or empty
+    # families of motion (bending, torsion, axial) that the scene can require of a link
     motions: tuple[Family, ...] = FAMILIES
 
     @property

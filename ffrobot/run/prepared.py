@@ -26,28 +26,21 @@ if TYPE_CHECKING:  # most scenes have none of these
 
 @struct
 class Prepared:
-    """A scene in space before its analyses.
+    """A scene in space before its analyses."""
 
-    Attributes:
-        scene, model: the scene and its equations.
-        bodies: by name.
-        patches: by body.
-        points: actuation points, by body.
-        divided: bodies in pieces by name; then `model` is that of the pieces, whose bodies are `parts`, and `whole`
-            that of the links.
-        stiffened: whether all links have geometric stiffening.
-        wanted: "ANALYSIS/NAME" of the datasets and groups to which results are limited; None: all.
-    """
-
+    # the scene and its equations
     scene: Scene
     model: Model
-    bodies: Mapping[str, LoadedBody]
-    patches: Mapping[str, LinkPatches]
-    points: Mapping[str, PointSet] = field(default_factory=dict)
+    bodies: Mapping[str, LoadedBody]  # by name
+    patches: Mapping[str, LinkPatches]  # by body
+    points: Mapping[str, PointSet] = field(default_factory=dict)  # actuation points, by body
+    # bodies in pieces by name; then `model` is that of the pieces, whose bodies are `parts`, and `whole` that of the
+    # links
     divided: Mapping[str, BodyInPieces] = field(default_factory=dict)
     parts: Mapping[str, LoadedBody] = field(default_factory=dict)
     whole: Model | None = None
-    stiffened: bool = False
+    stiffened: bool = False  # whether all links have geometric stiffening
+    # "ANALYSIS/NAME" of the datasets and groups to which results are limited; None: all
     wanted: frozenset[str] | None = None
 
     def wants(self, name: str) -> bool:

@@ -40,23 +40,16 @@ if TYPE_CHECKING:  # most scenes have none of these
 
 @struct
 class FinerCheck:
-    """Result of a forward simulation on links with twice the modes.
+    """Result of a forward simulation on links with twice the modes."""
 
-    Attributes:
-        modes: number of eigenmodes of each flexible body in it.
-        point: point with the largest distance from the inverse analysis, of those on trajectories if there are any.
-        error: this distance, m.
-        status: how the simulation ended.
-        growth: mean rate, 1/s, at which the open loop multiplies deviations of the inverse analysis; nan if unknown.
-        least_voltage: V, that tracking needs with these modes; None of other kinds.
-    """
-
-    modes: Mapping[str, int]
+    modes: Mapping[str, int]  # number of eigenmodes of each flexible body in it
+    # point with the largest distance from the inverse analysis, of those on trajectories if there are any
     point: str
-    error: float
-    status: str
+    error: float  # this distance, m
+    status: str  # how the simulation ended
+    # mean rate, 1/s, at which the open loop multiplies deviations of the inverse analysis; nan if unknown
     growth: float
-    least_voltage: float | None = None
+    least_voltage: float | None = None  # V, that tracking needs with these modes; None of other kinds
 
     @property
     def in_words(self) -> str:
@@ -73,17 +66,11 @@ class FinerCheck:
 
 @struct
 class Histories:
-    """Reactions, stresses and actuation at outputs of an analysis, and at times between them that show peaks.
+    """Reactions, stresses and actuation at outputs of an analysis, and at times between them that show peaks."""
 
-    Attributes:
-        prepared: the scene.
-        run: the motion at all these T times.
-        outputs: numbers of those that are outputs.
-    """
-
-    prepared: Prepared = field(repr=False)
-    run: Run
-    outputs: Indices
+    prepared: Prepared = field(repr=False)  # the scene
+    run: Run  # the motion at all these T times
+    outputs: Indices  # numbers of those that are outputs
 
     @cached_property
     def reactions(self) -> Mapping[str, Wrench]:
@@ -118,25 +105,17 @@ class Histories:
 
 @struct
 class AnalysisResult:
-    """Results of one analysis.
+    """Results of one analysis."""
 
-    Attributes:
-        prepared: the scene.
-        run: its motion and statistics, with least-squares multipliers of redundant constraints.
-        histories: quantities with peaks, also between outputs.
-        commanding: the run whose paths it follows: itself, or the one that it replays.
-        sharing: reactions that redundant constraints leave undetermined; None where there are none.
-        check: result of `check = "finer"`; None without this key.
-        deviations: table of `robustness`; None without this key.
-    """
-
-    prepared: Prepared = field(repr=False)
-    run: Run
-    histories: Histories = field(repr=False)
+    prepared: Prepared = field(repr=False)  # the scene
+    run: Run  # its motion and statistics, with least-squares multipliers of redundant constraints
+    histories: Histories = field(repr=False)  # quantities with peaks, also between outputs
+    # the run whose paths it follows: itself, or the one that it replays
     commanding: Run = field(repr=False)
+    # reactions that redundant constraints leave undetermined; None where there are none
     sharing: Sharing | None = None
-    check: FinerCheck | None = None
-    deviations: Deviations | None = None
+    check: FinerCheck | None = None  # result of `check = "finer"`; None without this key
+    deviations: Deviations | None = None  # table of `robustness`; None without this key
 
     @classmethod
     def of(cls, prepared: Prepared, run: Run, earlier: Mapping[str, AnalysisResult]) -> Self:
@@ -303,45 +282,31 @@ Errors = Mapping[str, Mapping[str, float]]
 
 @struct
 class ModeChoice:
-    """Result of the search for the number of modes.
+    """Result of the search for the number of modes."""
 
-    Attributes:
-        errors: estimated error by omitted modes of the largest quantity of each kind, relative to its peak, by analysis
-            and kind; 0 where all modes of the files were needed.
-        before: likewise, the difference between the last two solves.
-        tried: numbers of modal coordinates of all bodies together in the solves; the last is the one kept.
-        seconds: wall time of the solves before the last.
-        highest: ω (rad/s) of the highest mode kept, and of the highest there is.
-    """
-
+    # estimated error by omitted modes of the largest quantity of each kind, relative to its peak, by analysis and kind;
+    # 0 where all modes of the files were needed
     errors: Errors
-    before: Errors
+    before: Errors  # likewise, the difference between the last two solves
+    # numbers of modal coordinates of all bodies together in the solves; the last is the one kept
     tried: tuple[int, ...]
-    seconds: float
-    highest: tuple[float, float]
+    seconds: float  # wall time of the solves before the last
+    highest: tuple[float, float]  # ω (rad/s) of the highest mode kept, and of the highest there is
 
 
 @struct
 class Solution(Prepared):
-    """Everything a solve of a scene in space computed.
+    """Everything a solve of a scene in space computed."""
 
-    Attributes:
-        analyses: results by name, in the order of the scene.
-        seconds: wall time by stage.
-        failure: the error that ended the run after these analyses; None without one.
-        unread: the run of an analysis whose integration succeeded and whose outputs failed.
-        path_notes: remarks on paths, such as the factor of `fastest`, one line each.
-        earlier: runs of analyses that are resumed, from a results file.
-        mode_choice: result of the search for `modes = "auto"`.
-    """
-
+    # results by name, in the order of the scene
     analyses: Mapping[str, AnalysisResult] = field(default_factory=dict)
-    seconds: Mapping[str, float] = field(default_factory=dict)
-    failure: Exception | None = None
-    unread: Run | None = None
-    path_notes: tuple[str, ...] = ()
+    seconds: Mapping[str, float] = field(default_factory=dict)  # wall time by stage
+    failure: Exception | None = None  # the error that ended the run after these analyses; None without one
+    unread: Run | None = None  # the run of an analysis whose integration succeeded and whose outputs failed
+    path_notes: tuple[str, ...] = ()  # remarks on paths, such as the factor of `fastest`, one line each
+    # runs of analyses that are resumed, from a results file
     earlier: Mapping[str, Run] = field(default_factory=dict)
-    mode_choice: ModeChoice | None = None
+    mode_choice: ModeChoice | None = None  # result of the search for `modes = "auto"`
 
     @property
     def outcomes(self) -> dict[str, Run]:

@@ -35,27 +35,20 @@ T = TypeVar("T")
 
 @struct
 class Candidate:
-    """A stream of T set points for n joints, and the simulated motion of the robot.
+    """A stream of T set points for n joints, and the simulated motion of the robot."""
 
-    Attributes:
-        name: how it was made.
-        times, command: (T,) s, and (T, n) set points, rad or m.
-        moments: (T, n) feed-forward torques of motors, N·m or N, of inverted motions; None of others.
-        ride: the simulated motion.
-        off_path: largest distance from the recorded path, of all joints together, rad or m.
-        excess: largest ratio of speed, acceleration or jerk to its limit; 0 without limits, above 1 also beyond a
-            limit of positions.
-        torque: largest ratio of a motor's torque to its limit; 0 without limits.
-    """
-
-    name: str
+    name: str  # how it was made
+    # (T,) s, and (T, n) set points, rad or m
     times: Array
     command: Array
+    # (T, n) feed-forward torques of motors, N·m or N, of inverted motions; None of others
     moments: Array | None
-    ride: Ride
-    off_path: float
+    ride: Ride  # the simulated motion
+    off_path: float  # largest distance from the recorded path, of all joints together, rad or m
+    # largest ratio of speed, acceleration or jerk to its limit; 0 without limits, above 1 also beyond a limit of
+    # positions
     excess: float
-    torque: float
+    torque: float  # largest ratio of a motor's torque to its limit; 0 without limits
 
     @property
     def settled(self) -> float:

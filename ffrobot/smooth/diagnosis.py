@@ -20,33 +20,25 @@ CAUSES = ("jitter", "jump", "noise", "gap", "coarse", "resonance")
 
 @struct
 class Diagnosis:
-    """Diagnosis of a stream of set points for n joints of a robot.
+    """Diagnosis of a stream of set points for n joints of a robot."""
 
-    Attributes:
-        recording, ride: the stream, and the simulated motion under it.
-        even: simulated motion under the same set points at even times; `ride` where these are no smoother.
-        faults: of the stream.
-        modes: small vibrations in postures along the motion, the last one at rest, with motors locked.
-        frequencies: (postures, k) Hz, the lowest of these modes.
-        alone: (n,) m peak to peak, the most that each joint alone leaves as residual vibration at the point: the sum
-            over all modes of the linear model at the end.
-        shares: (n,) of each joint in the vibration, in phase with the whole; they add up to 1.
-        by_mode: (k,) m peak to peak, residual vibration by all joints at each frequency.
-        spectrum: (1 + n, F) frequencies, Hz, and |∫ θ̈ e^(−iωt) dt| of motors' accelerations θ̈, rad/s or m/s.
-        peaks: (3, n) largest speed, acceleration and jerk, in rad or m, and s.
-    """
-
+    # the stream, and the simulated motion under it
     recording: Recording
     ride: Ride
+    # simulated motion under the same set points at even times; `ride` where these are no smoother
     even: Ride
-    faults: tuple[Fault, ...]
+    faults: tuple[Fault, ...]  # of the stream
+    # small vibrations in postures along the motion, the last one at rest, with motors locked
     modes: Sequence[Modes]
-    frequencies: Array
+    frequencies: Array  # (postures, k) Hz, the lowest of these modes
+    # (n,) m peak to peak, the most that each joint alone leaves as residual vibration at the point: the sum over all
+    # modes of the linear model at the end
     alone: Array
-    shares: Array
-    by_mode: Array
+    shares: Array  # (n,) of each joint in the vibration, in phase with the whole; they add up to 1
+    by_mode: Array  # (k,) m peak to peak, residual vibration by all joints at each frequency
+    # (1 + n, F) frequencies, Hz, and |∫ θ̈ e^(−iωt) dt| of motors' accelerations θ̈, rad/s or m/s
     spectrum: Array
-    peaks: Array
+    peaks: Array  # (3, n) largest speed, acceleration and jerk, in rad or m, and s
 
     @property
     def residual(self) -> float:

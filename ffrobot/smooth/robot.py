@@ -45,15 +45,12 @@ def accelerations(path: Piecewise) -> tuple[Array, Array]:
 
 @struct
 class Modes:
-    """Small vibrations of the robot at one posture with its motors at rest, the slowest first: k of them.
+    """Small vibrations of the robot at one posture with its motors at rest, the slowest first: k of them."""
 
-    Attributes:
-        omega, ratio: (k,) rad/s, and damping ratios.
-        driven: (k, n) acceleration of `Robot.point` in each mode's direction, by each motor's: m/s² per rad/s² or m/s².
-    """
-
+    # (k,) rad/s, and damping ratios
     omega: Array
     ratio: Array
+    # (k, n) acceleration of `Robot.point` in each mode's direction, by each motor's: m/s² per rad/s² or m/s²
     driven: Array
 
     def left(self, times: Array, accelerations: Array) -> ComplexArray:
@@ -69,22 +66,18 @@ class Modes:
 
 @struct
 class Ride:
-    """Simulated motion of the robot under one stream of set points.
+    """Simulated motion of the robot under one stream of set points."""
 
-    Attributes:
-        settling: of the point, by its distance from its final place since the last set point; its residual is that of
-            the first period of the lowest vibration once the controllers have settled. None without a place of rest.
-        times, off: (T,) s, and distance of the point from its final place, m.
-        postures: (`INSTANTS`, n_q) coordinates, rad and m, evenly up to the last set point; the last is that of rest.
-        torque: (n,) largest of each motor, N·m or N.
-        sag: (2, n) by which joints are off their set points at rest, at the start and at the end, rad or m.
-    """
-
+    # of the point, by its distance from its final place since the last set point; its residual is that of the first
+    # period of the lowest vibration once the controllers have settled. None without a place of rest
     settling: Settling | None
+    # (T,) s, and distance of the point from its final place, m
     times: Array
     off: Array
+    # (`INSTANTS`, n_q) coordinates, rad and m, evenly up to the last set point; the last is that of rest
     postures: Array
-    torque: Array
+    torque: Array  # (n,) largest of each motor, N·m or N
+    # (2, n) by which joints are off their set points at rest, at the start and at the end, rad or m
     sag: Array
 
 

@@ -23,19 +23,14 @@ Value: TypeAlias = Any
 
 @dataclass(frozen=True)
 class Variation:
-    """Varied key of the scene or a link file (`links.BODY.…`), or several varied together, and its values.
+    """Varied key of the scene or a link file (`links.BODY.…`), or several varied together, and its values."""
 
-    Attributes:
-        keys: parts of each key, `("links", "link1", "geometry", "section", "height")`.
-        values: the values, in order.
-        ends: first and last value of a range, from which a sample draws; None where values are listed.
-        logarithmic: whether values of a range are evenly spaced in the logarithm.
-    """
-
+    # parts of each key, `("links", "link1", "geometry", "section", "height")`
     keys: tuple[tuple[str, ...], ...]
-    values: tuple[Value, ...]
+    values: tuple[Value, ...]  # the values, in order
+    # first and last value of a range, from which a sample draws; None where values are listed
     ends: tuple[float, float] | None = None
-    logarithmic: bool = False
+    logarithmic: bool = False  # whether values of a range are evenly spaced in the logarithm
 
     @property
     def name(self) -> str:
@@ -100,16 +95,11 @@ LINKS, SCENE = "links", "scene.toml"
 
 @dataclass(frozen=True)
 class RunFiles:
-    """Content of the scene file of one run and of its changed link files.
+    """Content of the scene file of one run and of its changed link files."""
 
-    Attributes:
-        scene: tables of the scene, with the names of changed link files in the run's folder.
-        links: tables of changed link files, by their path there.
-        inputs: fingerprints of everything that the run is made from, under the names of the user's files.
-    """
-
-    scene: Table
-    links: dict[Path, Table]
+    scene: Table  # tables of the scene, with the names of changed link files in the run's folder
+    links: dict[Path, Table]  # tables of changed link files, by their path there
+    # fingerprints of everything that the run is made from, under the names of the user's files
     inputs: dict[str, str]
 
     def write(self, folder: Path) -> Path:

@@ -41,11 +41,6 @@ class Servo:
     With a smaller factor, the output is where these would be with the same motor coordinates and the deflections
     `factor` p + `offset` in place of p (Wang and Vidyasagar 1991; De Luca and Siciliano 1993).
     At `near_times` (N,), s, `near` (N, n_q), rad and m, are postures without deflections.
-
-    Attributes:
-        where: scene and analysis, for messages.
-        goes_on: is called often; False stops the solution.
-        offset: functions of time, m·√kg, one per mode of all bodies: 1 − `factor` of quasi-static p; () for 0.
     """
 
     model: Model
@@ -53,8 +48,9 @@ class Servo:
     factor: float
     near_times: Array
     near: Array
-    where: str
-    goes_on: Callable[[], bool]
+    where: str  # scene and analysis, for messages
+    goes_on: Callable[[], bool]  # is called often; False stops the solution
+    # functions of time, m·√kg, one per mode of all bodies: 1 − `factor` of quasi-static p; () for 0
     offset: tuple[TimeFunction, ...] = ()
 
     @cached_property

@@ -79,26 +79,16 @@ class Played:
 
 @struct
 class Amplifiers:
-    """Amplifiers of k patches; without one, limits are infinite and voltages arrive at once. SI units.
+    """Amplifiers of k patches; without one, limits are infinite and voltages arrive at once. SI units."""
 
-    Attributes:
-        range: (2, k) smallest and largest voltage, V.
-        slew: (k,) largest rate of the voltage, V/s.
-        current: (k,) largest current, A.
-        capacitance: (k,) F, of patches on a link that stands still.
-        bandwidth: (k,) of first order, Hz.
-        delay: (k,) s.
-        plays: (2, MOST_PLAYS, k) weights and thresholds of the patches' hysteresis.
-        compensated: (k,) 1.0 where wanted voltages go through the inverse of the hysteresis first, else 0.0.
-    """
-
-    range: Array
-    slew: Array
-    current: Array
-    capacitance: Array
-    bandwidth: Array
-    delay: Array
-    plays: Array
+    range: Array  # (2, k) smallest and largest voltage, V
+    slew: Array  # (k,) largest rate of the voltage, V/s
+    current: Array  # (k,) largest current, A
+    capacitance: Array  # (k,) F, of patches on a link that stands still
+    bandwidth: Array  # (k,) of first order, Hz
+    delay: Array  # (k,) s
+    plays: Array  # (2, MOST_PLAYS, k) weights and thresholds of the patches' hysteresis
+    # (k,) 1.0 where wanted voltages go through the inverse of the hysteresis first, else 0.0
     compensated: Array
 
     @property

@@ -27,19 +27,14 @@ IN_PLANE = ("t_x", "t_y", "r_z", "omega_zz")
 
 @struct
 class Stiffening:
-    """Integrals of G (n, n): bending moves points by −½ pᵀ G_l p along axis l; positive K stiffens under a load.
+    """Integrals of G (n, n): bending moves points by −½ pᵀ G_l p along axis l; positive K stiffens under a load."""
 
-    Attributes:
-        K_s: (3, n, n) ∫ρ G_l dV, 1/m.
-        K_x: (3, 3, n, n) ∫ρ x_k G_l dV at [k, l], without unit.
-        K_points: (6, n, n) G of each interface along x, y, z, 1/(kg·m), and of its rotation about them, 1/(kg·m²).
-        S_turned: (3, 3, n, n) part of S̄_kl by the extent of payloads, without unit: `Body.S_bar_kl` lacks it, as only
-            equations with K_x have it.
-    """
-
-    K_s: Array
-    K_x: Array
+    K_s: Array  # (3, n, n) ∫ρ G_l dV, 1/m
+    K_x: Array  # (3, 3, n, n) ∫ρ x_k G_l dV at [k, l], without unit
+    # (6, n, n) G of each interface along x, y, z, 1/(kg·m), and of its rotation about them, 1/(kg·m²)
     K_points: Mapping[str, Array]
+    # (3, 3, n, n) part of S̄_kl by the extent of payloads, without unit: `Body.S_bar_kl` lacks it, as only equations
+    # with K_x have it
     S_turned: Array
 
     def at(self, point: str) -> Array:

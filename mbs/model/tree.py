@@ -268,17 +268,11 @@ def loop_rows(scene: MechanismScene, tree: KinematicTree, joint: JointRecord) ->
 
 
 class CutMotion(NamedTuple):
-    """Motion of a coordinate of a cut joint.
+    """Motion of a coordinate of a cut joint."""
 
-    Attributes:
-        coordinate: (T,) rad or m, with full turns.
-        rate: (T,) rad/s or m/s.
-        is_counted: whether times are close enough together to count turns.
-    """
-
-    coordinate: Array
-    rate: Array
-    is_counted: bool
+    coordinate: Array  # (T,) rad or m, with full turns
+    rate: Array  # (T,) rad/s or m/s
+    is_counted: bool  # whether times are close enough together to count turns
 
 
 class AlongCut:

@@ -23,21 +23,14 @@ BESIDE = 0.05  # rad (and sizes of the robot) before a singular posture, where e
 
 @struct
 class Mobility:
-    """Mobility of the rigid mechanism in a posture.
+    """Mobility of the rigid mechanism in a posture."""
 
-    Attributes:
-        freedom: number of degrees of freedom that joints and loops leave.
-        followed: how many of these the trajectories prescribe.
-        ratio: smallest by largest singular value of the path's equations in these freedoms, lengths by robot size.
-        left: joints that still move with all trajectories prescribed.
-        loop_rank: rank of the loops' constraint equations.
-    """
-
-    freedom: int
-    followed: int
+    freedom: int  # number of degrees of freedom that joints and loops leave
+    followed: int  # how many of these the trajectories prescribe
+    # smallest by largest singular value of the path's equations in these freedoms, lengths by robot size
     ratio: float
-    left: tuple[str, ...]
-    loop_rank: int
+    left: tuple[str, ...]  # joints that still move with all trajectories prescribed
+    loop_rank: int  # rank of the loops' constraint equations
 
 
 def mobilities(model: Model, q: Array, times: Array, loop_rank: int = -1) -> list[_core.Mobility]:

@@ -32,20 +32,13 @@ X = np.array([1.0, 0.0, 0.0])
 
 @struct
 class BodyMotion:
-    """Motion of a body's frame and modes, one row per output, in global axes.
+    """Motion of a body's frame and modes, one row per output, in global axes."""
 
-    Attributes:
-        position: (T, 3) R of the frame's origin, m.
-        orientation: (T, 4) quaternions, the scalar first, of continuous sign.
-        velocity: (T, 3) m/s.
-        angular_velocity: (T, 3) rad/s.
-        modal, modal_velocity: (T, n), √kg·m and √kg·m/s, in the modes of the modal body file.
-    """
-
-    position: Array
-    orientation: Array
-    velocity: Array
-    angular_velocity: Array
+    position: Array  # (T, 3) R of the frame's origin, m
+    orientation: Array  # (T, 4) quaternions, the scalar first, of continuous sign
+    velocity: Array  # (T, 3) m/s
+    angular_velocity: Array  # (T, 3) rad/s
+    # (T, n), √kg·m and √kg·m/s, in the modes of the modal body file
     modal: Array
     modal_velocity: Array
 

@@ -55,24 +55,16 @@ POSTURES = 2001  # outputs whose postures are looked at where the core does not 
 
 @struct
 class Control:
-    """Sampled commands of a controller to motors, N·m or N, and patches, V.
+    """Sampled commands of a controller to motors, N·m or N, and patches, V."""
 
-    Attributes:
-        commands: generalized forces of a unit of each command.
-        first: (inputs,) commands before those of the first sample act.
-        times: (K,) s, of the samples; the commands of each act `delay` (s) later.
-        controller: commands (inputs,) by sample number, time (s) and state: q (n_q,), v, a (n_v,) in one array, SI.
-        held: after a run, the commands (T, inputs) that act at times (T,), s.
-        instant: s, before and after a change of commands at which they are recorded.
-    """
-
-    commands: tuple[Command, ...]
-    first: Array
-    times: Array
+    commands: tuple[Command, ...]  # generalized forces of a unit of each command
+    first: Array  # (inputs,) commands before those of the first sample act
+    times: Array  # (K,) s, of the samples; the commands of each act `delay` (s) later
     delay: float
+    # commands (inputs,) by sample number, time (s) and state: q (n_q,), v, a (n_v,) in one array, SI
     controller: Callable[[int, float, Array], Array]
-    held: Callable[[Array], Array]
-    instant: float
+    held: Callable[[Array], Array]  # after a run, the commands (T, inputs) that act at times (T,), s
+    instant: float  # s, before and after a change of commands at which they are recorded
 
 
 def drive_robot(

@@ -102,19 +102,14 @@ def _along(node: Node, state: States) -> Array:
 
 
 class MotorCoordinates(NamedTuple):
-    """Motion in the coordinates of a robot with compliant gears.
+    """Motion in the coordinates of a robot with compliant gears."""
 
-    Attributes:
-        q, v, a: (T, n_q), (T, n_v), (T, n_v), SI units.
-        gears: by joint; {} where run and model have the same gears.
-        moments: (T, k) N·m or N, by joint, of all motors; {} likewise.
-    """
-
+    # (T, n_q), (T, n_v), (T, n_v), SI units
     q: Array
     v: Array
     a: Array
-    gears: Mapping[str, GearMotion]
-    moments: Mapping[str, Array]
+    gears: Mapping[str, GearMotion]  # by joint; {} where run and model have the same gears
+    moments: Mapping[str, Array]  # (T, k) N·m or N, by joint, of all motors; {} likewise
 
 
 def with_motor_coordinates(run: Run, model: Model) -> MotorCoordinates:

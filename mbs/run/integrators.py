@@ -264,19 +264,12 @@ def choose_integrator(
 
 
 class Stiffness(NamedTuple):
-    """How fast friction and compliant gears are in a state.
+    """How fast friction and compliant gears are in a state."""
 
-    Attributes:
-        friction: largest rate at which friction brings a joint to rest, 1/s.
-        joint: label of this joint.
-        gears: highest frequency of the gears without damping, rad/s.
-        damping: largest rate of their damping, 1/s.
-    """
-
-    friction: float
-    joint: str
-    gears: float
-    damping: float
+    friction: float  # largest rate at which friction brings a joint to rest, 1/s
+    joint: str  # label of this joint
+    gears: float  # highest frequency of the gears without damping, rad/s
+    damping: float  # largest rate of their damping, 1/s
 
     def describe(self, duration: float, integrator: str) -> str:
         """A sentence with advice where friction or gears are too fast for steps of the integrator; else ""."""

@@ -87,25 +87,18 @@ class GearCurve(NamedTuple):
 
 @struct
 class GearMotion:
-    """Motion of a compliant gear in an inverse analysis, one row per output.
+    """Motion of a compliant gear in an inverse analysis, one row per output."""
 
-    Attributes:
-        gear_moment: (T,) τ_s = k(δ) + c δ̇, N·m, of the gear on the joint's second body.
-        angle, rate, acceleration: (T,) θ_m of the motor at the gear's output, rad, rad/s, rad/s².
-        moment: (T,) motor torque at the gear's output, N·m: τ_s and that which accelerates the rotor.
-        unresolved: part of the largest moment by which it changes when only every second output is known.
-        twist: (T, 3) δ = θ_m − γ, rad, γ the joint's coordinate, with two derivatives by time.
-        curve: δ(t) between outputs; None where outputs are too few.
-    """
-
-    gear_moment: Array
+    gear_moment: Array  # (T,) τ_s = k(δ) + c δ̇, N·m, of the gear on the joint's second body
+    # (T,) θ_m of the motor at the gear's output, rad, rad/s, rad/s²
     angle: Array
     rate: Array
     acceleration: Array
-    moment: Array
+    moment: Array  # (T,) motor torque at the gear's output, N·m: τ_s and that which accelerates the rotor
+    # part of the largest moment by which it changes when only every second output is known
     unresolved: float
-    twist: Array
-    curve: GearCurve | None
+    twist: Array  # (T, 3) δ = θ_m − γ, rad, γ the joint's coordinate, with two derivatives by time
+    curve: GearCurve | None  # δ(t) between outputs; None where outputs are too few
 
 
 class Details:
@@ -120,63 +113,46 @@ class Details:
 
 
 class Prescription(NamedTuple):
-    """A motion whose modal coordinates are functions of time.
+    """A motion whose modal coordinates are functions of time."""
 
-    Attributes:
-        motion: makes new equations of it.
-        shape: p(t) of each body, m·√kg.
-        near: (n_q,) a posture near the first, rad and m.
-        voltages: V(t) (k,) by body, V, where the analysis itself finds them.
-        breaks: s, between pieces of p(t), where p̈ jumps.
-    """
-
-    motion: Callable[[], _core.SpatialPrescribedMotion]
-    shape: Sequence[Sequence[TimeFunction]]
-    near: Array
+    motion: Callable[[], _core.SpatialPrescribedMotion]  # makes new equations of it
+    shape: Sequence[Sequence[TimeFunction]]  # p(t) of each body, m·√kg
+    near: Array  # (n_q,) a posture near the first, rad and m
+    # V(t) (k,) by body, V, where the analysis itself finds them
     voltages: Mapping[str, PPoly] = MappingProxyType({})
-    breaks: Sequence[float] = ()
+    breaks: Sequence[float] = ()  # s, between pieces of p(t), where p̈ jumps
 
 
 @struct
 class Run:
-    """One run of an analysis: its motion, one row per output, SI units; the forces in it; how it went.
-
-    Attributes:
-        model: with the constraint equations of the run.
-        time: (T,) s.
-        q, v, a: (T, n_q), (T, n_v), (T, n_v) of the model's tree.
-        multipliers: (T, constraint equations).
-        required: (T, n_v) generalized forces of a prescribed shape; None where `multipliers` have all forces.
-        commanded: (T, k) by joint, N·m or N along its coordinates, of a controller or a replay.
-        voltages: (T, k) V by body, of patches where the analysis itself finds them.
-        applied: forces on points beside the loads of the scene.
-        is_at_rest: whether targets stand still, as in an equilibrium.
-        twists: of compliant gears by joint, where they are known between outputs.
-        links: by name, links whose pieces are bodies of `model`.
-        details: findings of its kind of analysis.
-        prescribed: its motion as functions of time, where no steps integrate it.
-        look_closer: makes a run with outputs also between those of this one; None where nothing is between.
-    """
+    """One run of an analysis: its motion, one row per output, SI units; the forces in it; how it went."""
 
     _: KW_ONLY
     analysis: Analysis
-    model: Model
-    time: Array
+    model: Model  # with the constraint equations of the run
+    time: Array  # (T,) s
+    # (T, n_q), (T, n_v), (T, n_v) of the model's tree
     q: Array
     v: Array
     a: Array
-    multipliers: Array
+    multipliers: Array  # (T, constraint equations)
+    # (T, n_v) generalized forces of a prescribed shape; None where `multipliers` have all forces
     required: Array | None = None
+    # (T, k) by joint, N·m or N along its coordinates, of a controller or a replay
     commanded: Mapping[str, Array] = field(default_factory=dict)
+    # (T, k) V by body, of patches where the analysis itself finds them
     voltages: Mapping[str, Array] = field(default_factory=dict)
-    applied: tuple[PointDrive, ...] = ()
-    is_at_rest: bool = False
+    applied: tuple[PointDrive, ...] = ()  # forces on points beside the loads of the scene
+    is_at_rest: bool = False  # whether targets stand still, as in an equilibrium
+    # of compliant gears by joint, where they are known between outputs
     twists: Mapping[str, GearCurve] = field(default_factory=dict)
+    # by name, links whose pieces are bodies of `model`
     links: Mapping[str, LinkInPieces] = field(default_factory=dict)
     statistics: Statistics = field(default=Statistics())
-    details: Details = field(default=Details())
+    details: Details = field(default=Details())  # findings of its kind of analysis
     continuation: Continuation | None = None
-    prescribed: Prescription | None = None
+    prescribed: Prescription | None = None  # its motion as functions of time, where no steps integrate it
+    # makes a run with outputs also between those of this one; None where nothing is between
     look_closer: Callable[[], Run] | None = None
 
     @property

@@ -186,24 +186,18 @@ class StudyTable(Record):
 
 
 class Study(Record):
-    """Result of a design command, as its JSON file contains it.
-
-    Attributes:
-        scene: path of the scene file; `scene_name`: name in it.
-        headline: the answer; `good`: whether it is the requested one, None if that cannot be judged.
-        facts: notes and method, a line each.
-    """
+    """Result of a design command, as its JSON file contains it."""
 
     format: Literal["ffrobot-study"] = "ffrobot-study"
     format_version: Literal[1] = 1
     ffrobot_version: str
     name: StudyName
     title: str
-    scene: str
+    scene: str  # path of the scene file; `scene_name`: name in it
     scene_name: str
-    headline: str
+    headline: str  # the answer; `good`: whether it is the requested one, None if that cannot be judged
     good: bool | None = None
-    facts: tuple[str, ...]
+    facts: tuple[str, ...]  # notes and method, a line each
     tables: tuple[StudyTable, ...]
     diagrams: tuple[Diagram, ...]
 

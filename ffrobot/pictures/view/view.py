@@ -44,20 +44,13 @@ CELL_TYPE = {1: 1, 2: 3, 3: 5, 4: 9}
 
 @struct
 class Grid:
-    """Cells on P points that move over T steps; SI units.
+    """Cells on P points that move over T steps; SI units."""
 
-    Attributes:
-        cells: blocks (c, v) of c cells with v corners each.
-        points: (T, P, 3) in m, global axes.
-        time: (T,) in s; None for a grid that does not move, T = 1.
-        point_data: (T, P) or (T, P, 3) by name.
-        cell_data: (C,) by name, for the C cells of all blocks.
-    """
-
-    cells: Sequence[Integers]
-    points: Array
-    time: Array | None = None
-    point_data: Mapping[str, Array] = field(default_factory=dict)
+    cells: Sequence[Integers]  # blocks (c, v) of c cells with v corners each
+    points: Array  # (T, P, 3) in m, global axes
+    time: Array | None = None  # (T,) in s; None for a grid that does not move, T = 1
+    point_data: Mapping[str, Array] = field(default_factory=dict)  # (T, P) or (T, P, 3) by name
+    # (C,) by name, for the C cells of all blocks
     cell_data: Mapping[str, NDArray[np.generic]] = field(default_factory=dict)
 
 
