@@ -3,7 +3,6 @@
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from types import ModuleType
 
 from .tables import shown
@@ -64,7 +63,7 @@ def of_file(name: object) -> Iterator[None]:
         raise
     except (InputError, SolveError) as error:
         first = str(error).partition(":")[0]  # this file, or another one
-        if str(error).startswith(str(name)) or str(name).startswith(f"{first}:") or Path(first).suffix:
+        if str(error).startswith(str(name)) or str(name).startswith(f"{first}:") or re.search(r"\.[A-Za-z]\w*$", first):
             raise
         raise type(error)(f"{name}: {error}") from error.__cause__
     except (LinAlgError, FloatingPointError) as error:

@@ -79,7 +79,7 @@ class Fcid(TimedAnalysis):
         rows = int(np.count_nonzero(~model.loop_rows))
         if rows != freedom:
             raise InputError(
-                f'{model.scene.path}: analysis "{self.name}": kind: expected as many trajectory components as the'
+                f"kind: expected as many trajectory components as the"
                 f' mechanism has degrees of freedom ({freedom}) for "fcid"',
                 rows,
             )
@@ -188,8 +188,8 @@ def _static(model: Model, bodies: Bodies, analysis: Fcid, motion: PrescribedMoti
     p, is_met = static_shapes(omega, modal_sizes(bodies), forces, stiffness, len(nodes))
     if not is_met.all():
         raise SolveError(
-            f'{model.scene.path}: analysis "{analysis.name}": no static shape was found at'
-            f" t = {nodes[is_met.argmin()]:g} s: the links are too soft for their loads there"
+            f"no static shape was found at t = {nodes[is_met.argmin()]:g} s: the links are too soft for their loads"
+            " there"
         )
     functions = iter(spline(nodes, p))
     return [[next(functions) for _ in range(body.n_modes)] for body in bodies]

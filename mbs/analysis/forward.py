@@ -156,8 +156,7 @@ def _behind_gears(source: Run, model: Model, analysis: Forward, context: Context
     """
     if analysis.apply not in ("joints", "joints+pzt"):
         raise InputError(
-            f'{model.scene.path}: analysis "{analysis.name}": apply: expected "joints" or "joints+pzt" for joints with'
-            " stiffness",
+            'apply: expected "joints" or "joints+pzt" for joints with stiffness',
             f'"{analysis.apply}"',
         )
     _check_motors(source.model, analysis, source.q[0])
@@ -218,14 +217,13 @@ def largest_moments(model: Model, *, limits: bool) -> Array:
 
 def _check_motors(model: Model, analysis: Forward, q: Array) -> None:
     """Raise `InputError` without motors, and in the plane where their moments were not computed at q (n_q,)."""
-    key = f'{model.scene.path}: analysis "{analysis.name}": apply'
     if not model.motors:
         raise InputError(
-            f'{key}: expected joints with motors for "{analysis.apply}"', "none: name them with motor = true"
+            f'apply: expected joints with motors for "{analysis.apply}"', "none: name them with motor = true"
         )
     count, freedom = len(model.motor_columns), mobility(model, q).freedom
     if model.scene.is_planar and count != freedom:
         raise InputError(
-            f'{key}: expected motors that fit the mechanism ({freedom} of them) for "{analysis.apply}"',
+            f'apply: expected motors that fit the mechanism ({freedom} of them) for "{analysis.apply}"',
             f'{count}; name them with motor = true, or use apply = "trajectory"',
         )

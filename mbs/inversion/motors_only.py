@@ -8,7 +8,6 @@ import math
 import time
 from collections.abc import Iterable
 from dataclasses import KW_ONLY, replace
-from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -51,11 +50,6 @@ class AroundPath(Details):
     inversion: Inversion | None = None
 
 
-def where(scene_path: Path, analysis: Analysis) -> str:
-    """Scene and name of the analysis, with which messages begin."""
-    return f'{scene_path}: analysis "{analysis.name}"'
-
-
 def is_minimum_phase(linear: Linearisation) -> bool:
     """Whether no zero is in the right half plane at rest, and none grows more than e-fold along the path."""
     at_rest = linear.zeros[[0, -1]]
@@ -80,7 +74,7 @@ def check_rest(servo: Servo, analysis: TimedAnalysis, ends: Iterable[float]) -> 
             rate = function(t)[1]
             if abs(rate) * analysis.end > REST * largest:
                 raise InputError(
-                    f'{servo.where}: trajectory "{name}": {component}: expected a path at rest at t ='
+                    f'trajectory "{name}": {component}: expected a path at rest at t ='
                     f' {t:g} s, before or after which "{analysis.name}" holds it',
                     f"the rate {rate:.4g}: start and end with zero speed, as 10*s**3 - 15*s**4 + 6*s**5 does",
                 )
@@ -176,7 +170,6 @@ class MotorsOnly(TimedAnalysis):
         found.
         """
         model, began, reached = context.model, time.perf_counter(), 0.0
-        place = where(model.scene.path, self)
 
         def progress(t: float | None = None) -> bool:
             nonlocal reached
@@ -185,7 +178,7 @@ class MotorsOnly(TimedAnalysis):
 
         refuse_prescribed_motors(model, self)
         try:
-            servo, linear = _choose_output(make_servo(model, self.end, place, progress), self)
+            servo, linear = _choose_output(make_servo(model, self.end, progress), self)
             is_at_rest_later = linear.is_future[0].any() or self.post_actuation
             check_rest(servo, self, [0.0, self.end] if is_at_rest_later else [0.0])
             pre, post = durations(linear, (self.pre_actuation, self.post_actuation), self.output_step)
@@ -195,11 +188,11 @@ class MotorsOnly(TimedAnalysis):
                     check_domain(function, times, f"{model.scene.path}: load no. {k}: {component}", 0)
             inversion = invert(servo, linear, pre, post, self.tolerance, progress)
         except Stopped:
-            raise SolveError(f"{place}: stopped on request before any of its motion was found") from None
+            raise SolveError("stopped on request before any of its motion was found") from None
         times = times[times <= inversion.curve.x[-1] + 1e-9 * self.end]  # what an integration reached
         run = _run(self, model, inversion, times)
         if not len(run.time):
-            raise SolveError(f"{servo.where}: no motion was found ({inversion.status}): {cause_of(inversion)}")
+            raise SolveError(f"no motion was found ({inversion.status}): {cause_of(inversion)}")
         around = AroundPath(pre_actuation=pre, post_actuation=post, inversion=inversion, held=inversion.servo.model)
         warnings = _warnings(inversion, run)
         statistics = replace(run.statistics, wall_seconds=time.perf_counter() - began, warnings=warnings)
@@ -266,7 +259,7 @@ def _warnings(inversion: Inversion, run: Run) -> tuple[str, ...]:
 
 def _choose_output(servo: Servo, analysis: MotorsOnly) -> tuple[Servo, Linearisation]:
     """Choose the output to follow the path: the scene's, or the minimum-phase one nearest to the point itself."""
-    end, where = analysis.end, servo.where
+    end = analysis.end
     if analysis.output == "tip" or analysis.factor is not None:
         if analysis.factor is not None:
             servo = replace(servo, factor=analysis.factor)
@@ -276,12 +269,12 @@ def _choose_output(servo: Servo, analysis: MotorsOnly) -> tuple[Servo, Linearisa
         worst = int(ratios.argmin())
         if ratios[worst] < SINGULAR:
             raise InputError(
-                f"{where}: expected motors that accelerate every component of the path",
+                "expected motors that accelerate every component of the path",
                 f"at t = {linear.times[worst]:.4g} s a singular coupling, {INFINITE}",
             )
         if analysis.output == "redefined" and not is_minimum_phase(linear):
             raise InputError(
-                f"{where}: factor: expected one whose output is minimum phase, since it is integrated forward",
+                "factor: expected one whose output is minimum phase, since it is integrated forward",
                 f"{analysis.factor:g} with zeros in the right half plane: {describe_zeros(linear)}; use a smaller"
                 ' factor, leave it out, or use output = "tip"',
             )
@@ -292,7 +285,7 @@ def _choose_output(servo: Servo, analysis: MotorsOnly) -> tuple[Servo, Linearisa
         if not is_unstable(linear.zeros).any() and is_minimum_phase(linearise(servo, end)):
             return _with_expected_deflections(replace(servo, factor=MARGIN * servo.factor), end)
     raise InputError(
-        f'{where}: output: expected a robot whose joint motion is minimum phase for "redefined"',
+        'output: expected a robot whose joint motion is minimum phase for "redefined"',
         f"zeros in the right half plane even then: {describe_zeros(linear)}",
     )
 

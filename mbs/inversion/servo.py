@@ -48,7 +48,6 @@ class Servo:
     factor: float
     near_times: Array
     near: Array
-    where: str  # scene and analysis, for messages
     goes_on: Callable[[], bool]  # is called often; False stops the solution
     # functions of time, m·√kg, one per mode of all bodies: 1 − `factor` of quasi-static p; () for 0
     offset: tuple[TimeFunction, ...] = ()
@@ -148,10 +147,10 @@ class Servo:
         return left_slopes(self.model, self.motion, (p, v, a), times, self.postures(times))
 
 
-def make_servo(model: Model, end: float, where: str, goes_on: Callable[[], bool], kind: str = "motors-only") -> Servo:
+def make_servo(model: Model, end: float, goes_on: Callable[[], bool], kind: str = "motors-only") -> Servo:
     """The robot under a path that rests before 0 and after `end` (s), whose own points are the output.
 
-    `where` and `kind` are for messages; `Stopped` is raised when `goes_on` returns False. Raises `InputError` without
+    `kind` is for messages; `Stopped` is raised when `goes_on` returns False. Raises `InputError` without
     modes, for a path that jumps or that the undeformed robot cannot follow, and unless motors and path components are
     as many as degrees of freedom.
     """
@@ -165,13 +164,12 @@ def make_servo(model: Model, end: float, where: str, goes_on: Callable[[], bool]
     ):
         if count != freedom:
             raise InputError(
-                f'{where}: expected for kind = "{kind}" as many {what} as the mechanism has degrees of freedom'
-                f" ({freedom})",
+                f'expected for kind = "{kind}" as many {what} as the mechanism has degrees of freedom ({freedom})',
                 count,
             )
     if not any(node.body.n_modes for node in model.tree.nodes):
         raise InputError(
-            f'{where}: expected at least one flexible body for kind = "{kind}"', 'only rigid ones: use kind = "pcid"'
+            f'expected at least one flexible body for kind = "{kind}"', 'only rigid ones: use kind = "pcid"'
         )
     for path in model.scene.trajectory:
         targets = ((f'trajectory "{path.name}": {name}', target) for name, target in path.targets)
@@ -179,7 +177,7 @@ def make_servo(model: Model, end: float, where: str, goes_on: Callable[[], bool]
     if not goes_on():
         raise Stopped
     times = np.linspace(0.0, end, POSTURES)
-    servo = Servo(held, end, 1.0, times, start[None], where=where, goes_on=goes_on)
+    servo = Servo(held, end, 1.0, times, start[None], goes_on=goes_on)
     modes = np.tile(np.concatenate([start[node.p_q] for node in model.tree.nodes]), (POSTURES, 1))
     rest = np.zeros_like(modes)
     near: Array = servo.motion.motion(times.tolist(), modes, rest, rest, start[None]).q
@@ -188,7 +186,7 @@ def make_servo(model: Model, end: float, where: str, goes_on: Callable[[], bool]
         if q is None:
             far = out_of_reach(held, times)
             raise InputError(
-                f"{where}: trajectory: expected a path within reach, found no posture at t = {times[k]:.6g} s"
+                f"trajectory: expected a path within reach, found no posture at t = {times[k]:.6g} s"
                 + (f": {far}" if far else "")
             )
         near[k] = q

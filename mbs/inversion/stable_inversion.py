@@ -193,7 +193,7 @@ def _boundaries(servo: Servo, linear: Linearisation, first: float, last: float) 
     excess = int(sum(of.sum() for of in enforced)) - linear.zeros.shape[1]
     if excess and not linear.singular_after:
         raise SolveError(
-            f"{servo.where}: stable inversion needs as many zeros in the right half plane at t = 0 s as at t ="
+            f"stable inversion needs as many zeros in the right half plane at t = 0 s as at t ="
             f" {linear.times[-1]:g} s, found {np.count_nonzero(~enforced[0])} and {np.count_nonzero(enforced[1])}."
             " Change the number of modes in the link files, end the path in a posture more like the first, or use"
             ' output = "redefined"'

@@ -51,7 +51,7 @@ def equilibrium(servo: Servo, t: float) -> Array:
         return p[0]
     soft = "the links are too soft for their loads there: stiffen them, or take less payload"
     cause = cause_in_posture(servo) or soft
-    raise SolveError(f"{servo.where}: no equilibrium under the motors was found at t = {t:g} s: {cause}")
+    raise SolveError(f"no equilibrium under the motors was found at t = {t:g} s: {cause}")
 
 
 def _shapes(servo: Servo, times: Array) -> tuple[Array, Booleans]:
@@ -190,4 +190,4 @@ def _check(servo: Servo, times: Array, is_met: Booleans) -> None:
     if not is_met.all():
         cause = cause_in_posture(servo) or "the links are too soft for their loads there; slow the path down"
         t = times[is_met.argmin()]
-        raise SolveError(f"{servo.where}: motor torques alone cannot follow the path at t = {t:g} s: {cause}")
+        raise SolveError(f"motor torques alone cannot follow the path at t = {t:g} s: {cause}")

@@ -87,8 +87,7 @@ def refuse_prescribed_motors(model: Model, analysis: Analysis) -> None:
     """Raise `InputError` for trajectories of motors with compliant gears in analyses that cannot follow them."""
     if any(path.motor for path in model.scene.trajectory) and elastic_joints(model):
         raise InputError(
-            f'{model.scene.path}: analysis "{analysis.name}": kind: expected "pcid" or "static" with trajectories of'
-            " motors with compliant gears",
+            'kind: expected "pcid" or "static" with trajectories of motors with compliant gears',
             f'"{analysis.kind}": the robot behind them is not prescribed',
         )
 

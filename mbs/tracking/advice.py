@@ -79,7 +79,7 @@ def bounds_of_zeros(asked: Transition, linear: Linearisation, around: tuple[floa
     pre, post = map(max, decay_times(linear, needs_future=True), around)
     inverted = invert(servo, linear, pre, post, INVERTED, lambda _: True)
     if inverted.status != "completed":
-        raise SolveError(f"{servo.where}: torques without voltages have no bounded motion: {inverted.status}")
+        raise SolveError(f"torques without voltages have no bounded motion: {inverted.status}")
     found = list[tuple[complex, float, float, float]]()
     for t, rest, sign in ((-around[0], asked.rest[0], 1.0), (end + around[1], asked.rest[1], -1.0)):
         n, still = len(rest), np.zeros((1, len(rest)))
@@ -179,8 +179,7 @@ def check_reach(posed: Posed, least: Tracked | None) -> None:
         f"patches that bend the links {share:.3g} times as much per volt",
     ]
     raise SolveError(
-        f"{servo.where}: patches cannot carry the robot: they would need {needed}. Any of these comes near:"
-        f" {'; '.join(would)}"
+        f"patches cannot carry the robot: they would need {needed}. Any of these comes near: {'; '.join(would)}"
     )
 
 
@@ -204,7 +203,7 @@ def check_motors(posed: Posed) -> None:
             if least.prices["torque"][k] > 0.0
         ]
         raise SolveError(
-            f"{servo.where}: no motion follows the path within the motors' limits, not even with"
+            "no motion follows the path within the motors' limits, not even with"
             f" {OUT_OF_REACH:g} times the voltages: raise moment_limit {' and '.join(needed)}, or slow the path down if"
             " torques at rest are within limits"
         )
@@ -214,17 +213,17 @@ def check_found(context: Context, posed: Posed, least: Tracked) -> None:
     """Raise `SolveError` if `least`, of least voltage, was not found: amplifiers too slow, or the path too fast."""
     if least.converged:
         return
-    asked, limits, place = posed.asked, posed.asked.limits, posed.asked.driven.where
+    asked, limits = posed.asked, posed.asked.limits
     if limits.patches.has_rates:
         none = np.full_like(limits.patches.slew, np.inf)
         free = replace(asked, limits=replace(limits, patches=replace(limits.patches, slew=none, current=none)))
         if track(free, posed.breaks).converged:
             raise SolveError(
-                f"{place}: no motion follows the path within the largest current and slew rate of the"
+                "no motion follows the path within the largest current and slew rate of the"
                 " amplifiers, whatever the voltages: slow the path down, or raise current or slew"
             )
     raise SolveError(
-        f"{place}: no motion of motors and patches was found: "
+        "no motion of motors and patches was found: "
         + (causes(context, posed) or f"slow the path down, allow pre_actuation and post_actuation, or {raised(posed)}")
     )
 
@@ -328,7 +327,7 @@ def check_ends_for_gears(servo: Servo) -> float:
     """
     for text in rough_ends(servo.functions, servo.end):
         raise InputError(
-            f"{servo.where}: trajectory: expected jerk and acceleration without jumps for compliant gears, whose"
+            "trajectory: expected jerk and acceleration without jumps for compliant gears, whose"
             " motors would need impulses",
             f"that {text}",
         )

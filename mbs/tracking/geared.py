@@ -108,7 +108,7 @@ def with_gears(servo: Servo) -> Servo:
         assert known is not None
         if known[0].knots:
             raise InputError(
-                f'{servo.where}: expected one stiffness of each gear for kind = "tracking"',
+                'expected one stiffness of each gear for kind = "tracking"',
                 f'steps in joint "{node.joint.name}": a torque that is smooth would need a motor that is not. Use a'
                 " mean stiffness",
             )
@@ -155,8 +155,7 @@ def _check_rotors(servo: GearedServo, ratios: Array) -> None:
             is_backwards = model.driven(joint).backwards
             remedy = "Exchange its sides in `between`" if is_backwards else "Put the motor on another joint of the loop"
             raise InputError(
-                f'{servo.where}: expected motors on bodies that they do not turn themselves for kind = "tracking" with'
-                " compliant gears",
+                'expected motors on bodies that they do not turn themselves for kind = "tracking" with compliant gears',
                 f'that of joint "{joint}" on its first body, which turns with it. {remedy}',
             )
 

@@ -19,7 +19,7 @@ from ...common.structs import struct
 from ...common.validation import Record
 from ..analysis.forward import Forward, largest_moments
 from ..fields.field_types import NotNegative, Positive
-from ..inversion.motors_only import AroundPath, check_rest, durations, outcome_along, where
+from ..inversion.motors_only import AroundPath, check_rest, durations, outcome_along
 from ..inversion.servo import Servo, Stopped, make_servo
 from ..inversion.stable_inversion import with_corners
 from ..inversion.zero_dynamics import equilibrium, linearise
@@ -163,8 +163,7 @@ class Tracking(TimedAnalysis):
                     f" over, more than the tolerance, {self.tolerance:g}: raise intervals, or loosen the tolerance"
                 )
         except Stopped:
-            place = where(model.scene.path, self)
-            raise SolveError(f"{place}: stopped on request before any of its motion was found") from None
+            raise SolveError("stopped on request before any of its motion was found") from None
         around = _around(context, posed, tracked, least, objective)
         times = output_times(self.end, self.output_step, around.pre_actuation, around.post_actuation)
 
@@ -209,15 +208,15 @@ def least_voltage(model: Model, patches: Mapping[str, PatchedLink], analysis: Tr
 
 def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, progress: Callable[[], bool]) -> Posed:
     """The problem of a path: its robot, limits, ends, and the first breaks."""
-    place, end = where(model.scene.path, analysis), analysis.end
-    servo = with_gears(make_servo(model, end, place, progress, analysis.kind))
+    end = analysis.end
+    servo = with_gears(make_servo(model, end, progress, analysis.kind))
     check_rest(servo, analysis, (0.0, end))
     gears = servo.gears if isinstance(servo, GearedServo) else None
     per_volt = [servo.model.modal_directions(of_link.per_volt) for of_link in patches.values()]
     Phi_V = np.concatenate(per_volt)[:, servo.of_modes].T  # (n, k) on all modes, of all patches of all links
     limits = Limits(joined(patches.values()), largest_moments(model, limits=True))
     if not np.any(Phi_V):
-        raise InputError(f'{place}: expected patches on flexible links for kind = "tracking"', "none that bend one")
+        raise InputError('expected patches on flexible links for kind = "tracking"', "none that bend one")
     linear = linearise(servo, end)
     given = (None if value == "auto" else value for value in (analysis.pre_actuation, analysis.post_actuation))
     around = durations(linear, given, analysis.output_step)
@@ -247,7 +246,7 @@ def _tolerance(servo: Servo, analysis: Tracking) -> Tolerance | None:
         return None
     if isinstance(servo, GearedServo):
         raise InputError(
-            f'{servo.where}: expected either rigid gears or no "path_tolerance"',
+            'expected either rigid gears or no "path_tolerance"',
             "compliant gears with one: their motors would need torques that jump with its acceleration. Remove it, or"
             " stiffness and damping of joints",
         )
@@ -255,7 +254,7 @@ def _tolerance(servo: Servo, analysis: Tracking) -> Tolerance | None:
     way = max((float(np.ptp(row.target.sample(servo.near_times)[0])) for row in rows if row.target), default=0.0)
     if error >= way:
         found = f"{error:g} m for a path of {way:.3g} m" if rows else "trajectories of joints or angles only"
-        raise InputError(f"{servo.where}: path_tolerance: expected a point whose path is longer", found)
+        raise InputError("path_tolerance: expected a point whose path is longer", found)
     return Tolerance(error, analysis.tolerance_time or TIME)
 
 
@@ -264,7 +263,7 @@ def _solve(context: Context, posed: Posed, analysis: Tracking, least: Tracked) -
     objective: Objective = "least-torque" if analysis.objective == "least-moment" else analysis.objective
     if is_beyond(posed, least) or needs_none(posed, least):
         objective = "least-voltage"
-    limits, servo = posed.asked.limits, posed.asked.driven  # torques are beyond between Gauss points, V by rounding
+    limits = posed.asked.limits  # torques are beyond between Gauss points, V by rounding
     within = replace(limits.patches, range=limits.patches.range * (1.0 - RESERVE))
     kept = Limits(within, limits.torque * (1.0 - analysis.tolerance))
     asked = replace(posed.asked, objective=objective, limits=kept)
@@ -277,7 +276,7 @@ def _solve(context: Context, posed: Posed, analysis: Tracking, least: Tracked) -
     if not tracked.converged:
         what = analysis.objective.removeprefix("least-")
         cure = causes(context, posed) or f"{raised(posed)}, intervals or the tolerance"
-        raise SolveError(f"{servo.where}: the motion of least {what} was not found: {cure}")
+        raise SolveError(f"the motion of least {what} was not found: {cure}")
     return tracked, objective
 
 

@@ -228,7 +228,7 @@ def test_a_torque_beyond_its_limit_is_said():
 
 def posed(tables):
     solution = prepare_scene(ffrobot.make_scene(**tables), Watcher())
-    return with_gears(make_servo(solution.model, solution.scene.analysis[0].end, "robot", lambda: True))
+    return with_gears(make_servo(solution.model, solution.scene.analysis[0].end, lambda: True))
 
 
 def moved_motors(*motors):
@@ -276,7 +276,7 @@ def test_without_voltage_motors_alone_carry(robot, tolerance):
     """V → 0 with time before and after: torques of stable inversion, from other collocation equations."""
     solution = prepare_scene(ffrobot.make_scene(**ROBOTS[robot]()), Watcher())
     end = solution.scene.analysis[0].end
-    servo = make_servo(solution.model, end, robot, lambda: True)
+    servo = make_servo(solution.model, end, lambda: True)
     per_volt = [servo.model.modal_directions(of.per_volt) for of in solution.patches.values()]
     Phi_V, linear = np.concatenate(per_volt)[:, servo.of_modes].T, linearise(servo, end)
     inverted = invert(servo, linear, *decay_times(linear, needs_future=True), tolerance, lambda _: True)

@@ -88,7 +88,7 @@ def test_closed_form_of_one_mode(f, J, V):
 
 def strip(modes, T, f):
     solution = prepare_scene(strip_scene(modes, T, of_hub=gear(f)), Watcher())
-    servo = with_gears(make_servo(solution.model, T, "strip", lambda: True))
+    servo = with_gears(make_servo(solution.model, T, lambda: True))
     return servo, servo.model.modal_directions(solution.patches["arm"].per_volt)[:, servo.of_modes].T
 
 
@@ -216,7 +216,7 @@ def test_zeros_that_a_rotor_takes_to_infinity(tolerance, expected):
     _, tables = random_arm(np.random.default_rng([62, 7]), tolerance)
     solution = prepare_scene(ffrobot.make_scene(**tables), Watcher())
     end = solution.scene.analysis[0].end
-    servo = with_gears(make_servo(solution.model, end, "arm", lambda: True))
+    servo = with_gears(make_servo(solution.model, end, lambda: True))
     linear = linearise(servo, end)
     np.testing.assert_allclose(own_changes(tables), expected, atol=1e-3)
     np.testing.assert_allclose(linear.times[list(linear.singular_after)], expected, atol=linear.times[1])

@@ -326,7 +326,7 @@ def test_derivatives_of_what_motors_on_frames_leave(factor):
     """Their moments act on modes beside, along axes that turn with the sections."""
     model, _, modes, near = drawn(2, ["revolute"] * 3)
     model = replace(model, scene=model.scene.model_copy(update={"motors": "frame"}))
-    servo = Servo(model, 1.0, factor, TIMES, near, "", lambda: True)
+    servo = Servo(model, 1.0, factor, TIMES, near, lambda: True)
     assert len(turning_motors(model)) == 3
     check_slopes_of_servo(servo, modes)
 
@@ -343,7 +343,7 @@ def test_motors_of_planar_joints_in_loops_go_with_the_redefined_output(cut):
     near, tree, modal = np.tile(q, (len(TIMES), 1)), model.tree, modal_columns(model.tree)
     modes = np.array([0.03 * SMALL, 1.0, 1.0])[:, None, None] * rng.standard_normal((3, len(TIMES), len(modal)))
     modes[0] += q[modal]
-    servo = Servo(model, 1.0, factor, TIMES, near, "", lambda: True)
+    servo = Servo(model, 1.0, factor, TIMES, near, lambda: True)
     found = servo.motion.motion(TIMES, *modes, near)
     on_path = _core.SpatialPrescribedMotion(in_core(model, []), q).motion(TIMES.tolist(), *factor * modes, near)
     node = tree.nodes[tree.carried["j1"]]

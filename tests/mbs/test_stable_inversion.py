@@ -44,7 +44,7 @@ def single_link(path, modes=4, damping_ratio=0.0, **keys):
 
 def at_rest(model, factor=1.0):
     """The equations of motors only with the robot at rest at t = 0: output, M, D and K."""
-    servo = replace(make_servo(model.model, 1.0, "scene", lambda: True), factor=factor)
+    servo = replace(make_servo(model.model, 1.0, lambda: True), factor=factor)
     p, rest = equilibrium(servo, 0.0), np.zeros((1, len(servo.scale)))
     return servo, linear_dynamics(servo, np.zeros(1), p[None], rest, rest)
 

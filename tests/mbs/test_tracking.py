@@ -46,7 +46,7 @@ def strip_scene(modes, T, pairs=4, of_hub=None, **of_analysis):
 
 def strip(modes, T, pairs=4):
     solution = prepare_scene(strip_scene(modes, T, pairs), Watcher())
-    servo = make_servo(solution.model, T, "strip", lambda: True)
+    servo = make_servo(solution.model, T, lambda: True)
     directions = servo.model.modal_directions(solution.patches["arm"].per_volt)
     return servo, directions[:, servo.of_modes].T
 
@@ -113,7 +113,7 @@ def arm(modes, patches, T, of_joints=()):
         path |= {axis: path[axis].replace(timing, ours) for axis in "xy"}
     tables["analysis"] = [tables["analysis"][0] | {"end": T}]
     solution = prepare_scene(ffrobot.make_scene(**tables), Watcher())
-    servo = make_servo(solution.model, T, "arm", lambda: True)
+    servo = make_servo(solution.model, T, lambda: True)
     per_volt = [servo.model.modal_directions(of_link.per_volt) for of_link in solution.patches.values()]
     return servo, np.concatenate(per_volt)[:, servo.of_modes].T
 
