@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -319,7 +318,6 @@ def links_in_motion(run: Run, bodies: Mapping[str, tuple[ModalBody, Body]]) -> d
 
 
 def judge_actuators(
-    path: Path,
     run: Run,
     links: Mapping[str, LinkInMotion],
     patches: Mapping[str, LinkPatches],
@@ -328,8 +326,7 @@ def judge_actuators(
 ) -> Feasibility:
     """Return the requirements on motors by joint ("JOINT 2" of a second coordinate) and on patches by layout.
 
-    `path` is that of the scene file, `patches` are by link, `voltages` by layout. Links among
-    `others` need no modal forces of patches.
+    `patches` are by link, `voltages` by layout. Links among `others` need no modal forces of patches.
     """
     judged: dict[str, PatchFeasibility] = {}
     for body, of_link in patches.items():
@@ -337,18 +334,18 @@ def judge_actuators(
         for name, array in of_link.arrays.items():
             if not array.layout.is_driven:
                 continue
-            trial = None if run.analysis.is_repeated else partial(_largest_voltage, path, run, link, array.layout)
+            trial = None if run.analysis.is_repeated else partial(_largest_voltage, run, link, array.layout)
             p, F_p = array.modes.coordinates(link.p), array.modes.forces(link.F_p)
             judged[name] = judge_patches(array, voltages[name], run.time, p, F_p, trial)
     return Feasibility(judge_motors(run), judged, find_unsupplied(run, links, patches, voltages, others))
 
 
-def _largest_voltage(path: Path, run: Run, link: LinkInMotion, layout: PztLayout, count: int) -> float | None:
+def _largest_voltage(run: Run, link: LinkInMotion, layout: PztLayout, count: int) -> float | None:
     """The voltage, V, that `count` such patches need alone, evenly spread; None if they have no room."""
     from .patches.link_patches import on_kept_modes, with_count
     from .patches.patches import voltage_gain
 
-    patches = with_count(path, layout, link.modal, link.spatial, count)
+    patches = with_count(layout, link.modal, link.spatial, count)
     if patches is None:
         return None
     if link.spatial.name in run.model.tree.index:  # else in pieces, with all modes

@@ -8,7 +8,6 @@ trajectories and of prescribed shapes.
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import combinations
-from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated
 
@@ -103,36 +102,33 @@ class PointSet:
         return self.scale[:, None] * self.L_a(p)
 
 
-def make_point_set(
-    scene_path: Path, layout: ActuationPoints, body: ModalBody | None, spatial: Body, space: Space
-) -> PointSet:
+def make_point_set(layout: ActuationPoints, body: ModalBody | None, spatial: Body, space: Space) -> PointSet:
     """Return the components of force in `layout`, or, if it has none, independent ones that are well conditioned.
 
     `body` is the modal body, None of a rigid body; `spatial` its equations. Raises `InputError` for places that the
     body does not have, for more components than coordinates, and for dependent components; in the plane also for a
     body whose points cannot carry all its generalized forces.
     """
-    key = f'{scene_path}: actuation_points "{layout.body}"'
     coordinates = len(space.translations) + len(space.rotations) + spatial.n_modes
     if not layout.places:
-        chosen = _automatic(key, layout.body, body, spatial, "".join(AXES[k] for k in space.translations))
+        chosen = _automatic(layout.body, body, spatial, "".join(AXES[k] for k in space.translations))
         if space.is_plane and len(chosen.names) < coordinates:  # in 3D forces on an axis do not turn about it
             raise InputError(
-                f"{key}: expected points that carry all {coordinates} generalized forces of the body",
+                f"expected points that carry all {coordinates} generalized forces of the body",
                 f"{len(chosen.names)} independent components among all its stations",
             )
         return chosen
     if len(layout.places) > coordinates:
         raise InputError(
-            f"{key}: expected at most as many components as the body has coordinates ({coordinates})",
+            f"expected at most as many components as the body has coordinates ({coordinates})",
             len(layout.places),
         )
-    points = [_point(key, place, body, spatial) for _, place in layout.places]
+    points = [_point(place, body, spatial) for _, place in layout.places]
     for (i, (along, first)), (k, (other, second)) in combinations(enumerate(layout.places), 2):
         near = 1e-9 * (spatial.length or 0.0)
         if along == other and np.allclose(points[i].position, points[k].position, rtol=0, atol=near):
             raise InputError(
-                f"{key}: {along}: expected points apart from each other", f"two at {first} and {second} that coincide"
+                f"{along}: expected points apart from each other", f"two at {first} and {second} that coincide"
             )
     chosen = _named(layout.body, tuple(ALONG[along] for along, _ in layout.places), points, spatial)
     sizes = np.linalg.svd(chosen.scaled(np.zeros((1, spatial.n_modes)))[0], compute_uv=False)
@@ -140,7 +136,7 @@ def make_point_set(
     if rank < len(points):
         along_x = "axial ones" if space.is_plane else "those along x"
         raise InputError(
-            f"{key}: expected components that differ in what they do to the body",
+            "expected components that differ in what they do to the body",
             f"{len(points)} of which only {rank} are independent: {along_x} coincide without axial modes, and it has"
             f" {coordinates} coordinates",
         )
@@ -153,13 +149,13 @@ def with_points(spatial: Body, chosen: PointSet) -> Body:
     return replace(spatial, points=MappingProxyType({**spatial.points, **own}))
 
 
-def _automatic(key: str, name: str, body: ModalBody | None, spatial: Body, axes: str) -> PointSet:
+def _automatic(name: str, body: ModalBody | None, spatial: Body, axes: str) -> PointSet:
     """Of all components at the stations of a link, or the points of a rigid body, the first in QR with pivoting."""
     if body is not None:
         places: list[Place] = np.unique(body.stations.position[:, 0]).tolist()
     elif not (places := list(spatial.points)):
-        raise InputError(f"{key}: expected a rigid body with points", "none")
-    points = [_point(key, place, body, spatial) for place in places]
+        raise InputError("expected a rigid body with points", "none")
+    points = [_point(place, body, spatial) for place in places]
     candidates = _named(name, tuple(axis for axis in axes for _ in points), points * len(axes), spatial)
     _, R, order = scipy.linalg.qr(candidates.scaled(np.zeros((1, spatial.n_modes)))[0], mode="economic", pivoting=True)
     sizes = np.abs(np.diag(R))
@@ -175,17 +171,17 @@ def _named(name: str, axes: tuple[str, ...], points: list[BodyPoint], spatial: B
     return PointSet(name, tuple(f"actuation{k}" for k in range(1, len(points) + 1)), axes, tuple(points), scale)
 
 
-def _point(key: str, place: Place, body: ModalBody | None, spatial: Body) -> BodyPoint:
+def _point(place: Place, body: ModalBody | None, spatial: Body) -> BodyPoint:
     """The point of a body with a name, or the section at a distance (m) from the root of its link."""
     points = spatial.points
     if isinstance(place, str):
-        check_known(place, points, f"{key}: expected a point of the body ({quoted(points)})")
+        check_known(place, points, f"expected a point of the body ({quoted(points)})")
         return points[place]
     if body is None:
-        raise InputError(f"{key}: expected points of the rigid body by name ({quoted(points)})", f"{place:g}")
+        raise InputError(f"expected points of the rigid body by name ({quoted(points)})", f"{place:g}")
     slack = 1e-9 * body.length
     if not -slack <= place <= body.length + slack:
-        raise InputError(f"{key}: expected places within the link, 0 … {body.length:g} m", f"{place:g} m")
+        raise InputError(f"expected places within the link, 0 … {body.length:g} m", f"{place:g} m")
     at, T = body.interpolate(place), spatial.modal_transform
     return BodyPoint(at.position, at.translation @ T, at.rotation @ T)
 

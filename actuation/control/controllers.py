@@ -115,7 +115,7 @@ def state_feedback(record: StateFeedback, setup: Setup) -> LinearFeedback:
     gain, size = np.array(record.gain), (len(record.inputs), len(states))
     if gain.shape != size:
         raise InputError(
-            f"{setup.robot.path}: controller state-feedback: expected gain with {size[0]} × {size[1]} numbers (inputs,"
+            f"controller state-feedback: expected gain with {size[0]} × {size[1]} numbers (inputs,"
             " states of the observer)",
             " × ".join(map(str, gain.shape)),
         )
@@ -262,13 +262,13 @@ class LqrControl:
         self.inputs = [i for i in acting if not setup.inputs[i].startswith("pzt/") or setup.inputs[i] not in left_out]
         names = [setup.inputs[i] for i in self.inputs]
         if not names:
-            raise InputError(f"{setup.robot.path}: controller lqr: expected motors or patches as inputs", "none")
+            raise InputError("controller lqr: expected motors or patches as inputs", "none")
         self.warnings = _out_of_reach(record, setup, model, names)
         Q, R = _weights(record, setup, model, names)
         waiting = int(np.ceil(setup.delay / setup.sample_time)) * len(names)
         if len(model.A) + waiting > MOST_STATES:
             raise InputError(
-                f"{setup.robot.path}: controller lqr: expected at most {MOST_STATES} states",
+                f"controller lqr: expected at most {MOST_STATES} states",
                 f"{len(model.A)} of the model and {waiting} commands on their way: a shorter delay or fewer inputs",
             )
         discrete = sampled(model.A, model.B[:, model.inputs(names)], setup.sample_time, setup.delay)
@@ -276,7 +276,7 @@ class LqrControl:
             self.K = gains(discrete, Q, R)
         except ValueError as error:
             raise InputError(
-                f"{setup.robot.path}: controller lqr: expected a model that motors and patches can stabilize",
+                "controller lqr: expected a model that motors and patches can stabilize",
                 f"none ({error}): {'; '.join(self.warnings) or 'more modes or other weights?'}",
             ) from None
         # the fastest of the model's motions that feedback changes: whose discrete pole moves

@@ -304,7 +304,7 @@ class Observed:
         self._x = observer.A @ x + observer.B @ (command - self._nominal[k]) + observer.M @ innovation
         if not np.abs(seen).max(initial=0.0) < FAR * (1.0 + np.abs(y).max(initial=0.0)):
             raise SolveError(
-                f"{setup.robot.path}: observer: the estimate diverges at t = {setup.times[k]:g} s: the model about the"
+                f"observer: the estimate diverges at t = {setup.times[k]:g} s: the model about the"
                 " reference does not fit the motion; gains along the path, or sensors that see more, may"
             )
         return u
@@ -413,7 +413,7 @@ def make_observed(
         if (radius := schedule.radius) >= 1.0:
             raise InputError("expected errors that die out along the path", f"|eigenvalue| = {radius:.6g}")
     except InputError as error:
-        raise InputError(f"{robot.path}: observer: {str(error).removeprefix(f'{robot.path}: controller: ')}") from None
+        raise InputError(f"observer: {str(error).removeprefix('controller: ')}") from None
     every = schedule.observers[0].estimates
     still = np.zeros((len(reference), len(every) - reference.shape[1]))
     inner = replace(

@@ -426,7 +426,7 @@ def _link(context: ActuatedContext, wanted: Placement) -> PatchableLink:
         raise InputError(f'{path}: placement.pzt: expected one of the layouts {quoted(arrays)} of "{name}"', found)
 
     def placed(layout: PztLayout) -> PatchArray:  # also where pieces carry them, on all modes of the link's file
-        return link_patches(path, [layout], context.links[name], context.carrying[name]).arrays[label]
+        return link_patches([layout], context.links[name], context.carrying[name]).arrays[label]
 
     array = placed(arrays[label].layout)
 

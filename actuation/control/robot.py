@@ -46,7 +46,7 @@ class RigidArm:
         freedom, count = rigid_freedom(model), len(model.motor_columns)
         if count != freedom:
             raise InputError(
-                f"{model.scene.path}: controller: expected motors that fit the mechanism ({freedom} of them)",
+                f"controller: expected motors that fit the mechanism ({freedom} of them)",
                 f"{count}; name them with motor = true",
             )
         scene = model.scene.model_copy(update={"load": (), "trajectory": ()})
@@ -85,7 +85,7 @@ class RigidArm:
         q, left = self._model.constraints.moved(self._q[None], now, beside)
         if not left[0] <= MET:
             raise SolveError(
-                f"{self._model.scene.path}: controller: expected joint angles that the rigid links can have",
+                "controller: expected joint angles that the rigid links can have",
                 f"{np.round(gamma, 6)}, {left[0]:.2g} (rad, sizes of the robot) from such: smaller steps of the path,"
                 " or a loop that stays nearer to it",
             )
@@ -312,7 +312,7 @@ class Setup:
 
     def _indices(self, names: Sequence[str], among: Sequence[str], of: str) -> Indices:
         if missing := [name for name in names if name not in among]:
-            raise InputError(f"{self.robot.path}: controller: expected {of}, {quoted(among)}", quoted(missing))
+            raise InputError(f"controller: expected {of}, {quoted(among)}", quoted(missing))
         return np.array([among.index(name) for name in names], dtype=int)
 
     def patch_places(self, body: str) -> Indices:

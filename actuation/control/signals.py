@@ -157,7 +157,7 @@ def _of_sensor(model: Model, context: ActuatedContext, sensor: Sensor, whole: Wh
         link, _, place = sensor.strain.partition(".")
         points = context.links[link].stress
         wanted = f'a point of [stress] in the link file of "{link}" ({quoted(points)})'
-        check_known(place, points, f"{model.scene.path}: sensor: strain: expected {wanted}")
+        check_known(place, points, f"sensor: strain: expected {wanted}")
         coordinates = _modal_coordinates(model, link, whole)
         tree = (model if whole is None else whole.model).tree
         on_file = tree.nodes[tree.index[link]].body.modal_transform
@@ -254,12 +254,11 @@ def check_joint(model: Model, joint: str) -> None:
     if not record.units or joint not in model.tree.carried:
         why = "at which a loop is cut" if record.units else "whose orientation is no list of coordinates"
         raise InputError(
-            f"{scene.path}: sensor or controller: joint: expected one with coordinates",
+            "sensor or controller: joint: expected one with coordinates",
             f'"{joint}", a {record.type} joint {why}',
         )
     if record.type == "planar" and model.tree.nodes[model.tree.carried[joint]].backwards:
         raise InputError(
-            f"{scene.path}: {record.label}: between: expected the side nearer to the ground first where sensors read a"
-            " planar joint",
+            f"{record.label}: between: expected the side nearer to the ground first where sensors read a planar joint",
             "it second",
         )

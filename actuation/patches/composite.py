@@ -262,9 +262,9 @@ class Effects(NamedTuple):
     capacitance: Array
 
 
-def effects(key: str, placed: Sequence[PlacedLayout], body: ModalBody) -> list[Effects]:
-    """Return the effects of each layout of one link, coupled by their stiffness if it counts; `key` begins messages."""
-    found = [_straight(key, one, body) for one in placed]
+def effects(placed: Sequence[PlacedLayout], body: ModalBody) -> list[Effects]:
+    """Return the effects of each layout of one link, coupled by their stiffness if it counts."""
+    found = [_straight(one, body) for one in placed]
     layouts, share = _each(placed)
     stiff, opened = np.array([(of.adds_stiffness, of.electrodes == "open") for of in layouts]).T
     lacking = np.zeros((len(layouts), body.mode_count))
@@ -283,11 +283,11 @@ def _each(placed: Sequence[PlacedLayout]) -> tuple[list[PztLayout], Array]:
     return layouts, np.diff(np.concatenate([one.edges for one in placed]))[:, 0] / [of.length for of in layouts]
 
 
-def _straight(key: str, placed: PlacedLayout, body: ModalBody) -> Effects:
+def _straight(placed: PlacedLayout, body: ModalBody) -> Effects:
     """Effects on a straight link: loads of a volt times differences of `potentials`, stretch by stretch."""
     layout, edges = placed
     own, sections = own_row(layout), link_sections(body)
-    starts, ends, stations, first = _stretches(key, layout, body, sections, edges)
+    starts, ends, stations, first = _stretches(layout, body, sections, edges)
     alike, which = np.unique(sections.alike[stations], return_inverse=True)
     places = np.array([place_of(layout, sections, station) for station in alike.tolist()])
     loads = np.array([straight_loads(layout, *place) for place in places])
@@ -303,20 +303,20 @@ def _straight(key: str, placed: PlacedLayout, body: ModalBody) -> Effects:
         membrane = c / (layout.width * extent / 2)
         if layout.strain == "biaxial":
             membrane /= 1.0 - (layout.poissons_ratio or 0.0)
-        Phi_V = membrane[:, None] * _outlined(key, layout, body, edges)
+        Phi_V = membrane[:, None] * _outlined(layout, body, edges)
     lever = lever / 2 if layout.bends == "twist" else np.ones(len(edges))
     return Effects(extent, c, lever, turn, Phi_V, np.zeros((0, 0)))
 
 
 def _stretches(
-    key: str, layout: PztLayout, body: ModalBody, sections: LinkSections, edges: Array
+    layout: PztLayout, body: ModalBody, sections: LinkSections, edges: Array
 ) -> tuple[Array, Array, Indices, Indices]:
     """Stretches of one extent below k patches: starts and ends (m,), m, stations (m,), first stretch (k,) of each."""
     x, (starts, ends) = body.stations.position[:, 0], edges.T
     slack = np.minimum(1e-9 * body.length, 0.25 * (ends - starts))
     covered = (x[1:] > (starts + slack)[:, None]) & (x[:-1] < (ends - slack)[:, None])
     if not covered.any(axis=1).all():  # round-off: it begins where it ends
-        raise InputError(f"{key}: length: expected patches that can be seen on a link of {body.length:g} m", "less")
+        raise InputError(f"length: expected patches that can be seen on a link of {body.length:g} m", "less")
     extents = sections.extent(layout.normal, side(layout))[:-1]
     jump = np.abs(np.diff(extents)) / np.maximum(extents[1:], extents[:-1])
     jumps = np.where(covered[:, 1:] & covered[:, :-1], jump, 0.0)
@@ -325,7 +325,7 @@ def _stretches(
         k = int(jumps[number].argmax())
         what = "height" if layout.normal == "y" else "width"
         raise InputError(
-            f"{key}: expected patches on one section each",
+            "expected patches on one section each",
             f"patch {number + 1} ({starts[number]:g} to {ends[number]:g} m) across a step of the {what} from"
             f" {extents[k]:g} to {extents[k + 1]:g} m at {x[k + 1]:g} m",
         )
@@ -341,19 +341,19 @@ def _stretches(
     return begin, found, stations, first
 
 
-def _outlined(key: str, layout: PztLayout, body: ModalBody, edges: Array) -> Array:
+def _outlined(layout: PztLayout, body: ModalBody, edges: Array) -> Array:
     """Modal forces (k, n) of unit membrane force, N/m, pressure on +y, tension on −y: mean of the layout's faces."""
     patches = body.surface_patches
     if patches is None:
         raise InputError(
-            f'{key}: coupling: expected "rotation", or a link whose file outlines the patches ([surface_patch])',
+            'coupling: expected "rotation", or a link whose file outlines the patches ([surface_patch])',
             '"surface" and none outlined',
         )
     found = (*edges.ravel(), layout.width)
     outlined = (*patches.edges.ravel(), patches.width)
     if len(found) != len(outlined) or not np.allclose(found, outlined, rtol=0.0, atol=1e-6 * body.length):
         raise InputError(
-            f"{key}: coupling: expected the {len(patches.edges)} patches that the link file outlines, from"
+            f"coupling: expected the {len(patches.edges)} patches that the link file outlines, from"
             f" {_places(patches.edges)} m and {patches.width:g} m wide",
             f"{len(edges)}, from {_places(edges)} m and {layout.width:g} m wide",
         )
@@ -364,14 +364,14 @@ def _outlined(key: str, layout: PztLayout, body: ModalBody, edges: Array) -> Arr
             continue
         if layout.strain == "biaxial" and across is None:
             raise InputError(
-                f'{key}: strain: expected "uniaxial", or a modal body file with strains across outlined patches',
+                'strain: expected "uniaxial", or a modal body file with strains across outlined patches',
                 "one of an earlier version: recompute it from its link file with `ffrobot link`",
             )
         outlined_on[face] = sign * (along if layout.strain != "biaxial" or across is None else along + across)
     wanted = ["+y", "-y"] if layout.face == "both" else [layout.face] if layout.face else list(outlined_on)
     if missing := [face for face in wanted if face not in outlined_on]:
         raise InputError(
-            f"{key}: face: expected patches on faces that the link file outlines ([surface_patch] faces)",
+            "face: expected patches on faces that the link file outlines ([surface_patch] faces)",
             f'"{layout.face}", of which {missing[0]} has none outlined',
         )
     return np.asarray(np.mean([outlined_on[face] for face in wanted], axis=0))

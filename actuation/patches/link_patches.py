@@ -6,13 +6,12 @@ torsion (fibers at an angle), axial modes (one named face). Modal forces on othe
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...common.arrays import Array, Indices
-from ...common.errors import InputError
+from ...common.errors import InputError, naming
 from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
 from ...mbs import _core
@@ -149,17 +148,18 @@ def driven_patches(placed: Iterable[PlacedLayout | PatchArray]) -> Array:
     return np.concatenate([np.full(len(one.edges), one.layout.is_driven) for one in placed])
 
 
-def placed_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody) -> list[PlacedLayout]:
+def placed_patches(layouts: Sequence[PztLayout], body: ModalBody) -> list[PlacedLayout]:
     """Return layouts with positions of patches, and `strain`: by default "biaxial" on wide links and outlined faces.
 
-    Raises `InputError`, which begins with the scene's `path`, for patches that do not fit the link.
+    Raises `InputError` for patches that do not fit the link.
     """
     placed = []
     for layout in layouts:
-        key, edges = _key(path, layout.label), patch_edges(layout, body.length)
-        check_sections(key, body, layout.normal, twists=layout.fibre_angle is not None)
-        check_edges(key, edges, body.length)
-        check_width(key, body, layout, edges)
+        edges = patch_edges(layout, body.length)
+        with naming(_key(layout)):
+            check_sections(body, layout.normal, twists=layout.fibre_angle is not None)
+            check_edges(edges, body.length)
+            check_width(body, layout, edges)
         across = link_sections(body).extent("z" if layout.normal == "y" else "y")
         is_wide = layout.coupling == "surface" or bool(np.nanmax(across, initial=0.0) >= WIDE * body.length)
         plain = layout.fibre_angle is None and layout.poissons_ratio is not None
@@ -168,22 +168,22 @@ def placed_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody) ->
     return placed
 
 
-def link_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody, spatial: Body) -> LinkPatches:
+def link_patches(layouts: Sequence[PztLayout], body: ModalBody, spatial: Body) -> LinkPatches:
     """Place the layouts of one link, so that they serve all modes of its file that they excite; see `on_kept_modes`.
 
     `spatial`: equations of the link. Raises `InputError` for patches or weights that do not fit the link.
     """
     spatial = spatial.whole
-    key = _key(path, layouts[0].label if len(layouts) == 1 else layouts[0].body)
-    placed = placed_patches(path, layouts, body)
-    found = effects(key, placed, body)
+    placed = placed_patches(layouts, body)
+    with naming(_key(*layouts)):
+        found = effects(placed, body)
     charge, turn = (np.concatenate(of).T for of in ([one.Phi_V for one in found], [one.turn for one in found]))
     capacitance, driven = np.concatenate([one.capacitance for one in found]), driven_patches(placed)
-    arrays = {one.layout.label: _array(path, one, body, spatial, of) for one, of in zip(placed, found, strict=True)}
+    arrays = {one.layout.label: _array(one, body, spatial, of) for one, of in zip(placed, found, strict=True)}
     reach: Reach = next(iter(arrays.values()))
     if len(layouts) > 1:
         reached = reached_modes((charge * driven if driven.any() else charge).T, body, spatial)
-        reach = _together(path, layouts, arrays, reached, charge.T)
+        reach = _together(layouts, arrays, reached, charge.T)
     if not driven.all():
         reach = replace(reach, Phi_V=reach.Phi_V * driven)
     own = {layouts[0].body: OnBody(charge * driven, turn, np.eye(body.mode_count), charge, capacitance)}
@@ -193,12 +193,12 @@ def link_patches(path: Path, layouts: Sequence[PztLayout], body: ModalBody, spat
     return LinkPatches(arrays, reach, own, float(np.sqrt(body.mass / body.length * softest)))
 
 
-def check_reach(path: Path, of_link: LinkPatches) -> None:
+def check_reach(of_link: LinkPatches) -> None:
     """Raise `InputError` unless patches excite all modes that they are to serve, or `allocation` is least-squares."""
     layouts = [array.layout for array in of_link.arrays.values() if array.layout.is_driven]
     if not layouts or any(layout.allocation != "exact" for layout in layouts):
         return
-    key, reach = _key(path, layouts[0].label if len(layouts) == 1 else of_link.body), of_link.reach
+    key, reach = _key(*layouts), of_link.reach
     advice = 'or accept unmet modal forces: allocation = "least-squares"'
     n, k = reach.served, reach.Phi_V.shape[1]
     if not n:
@@ -216,28 +216,25 @@ def check_reach(path: Path, of_link: LinkPatches) -> None:
         )
 
 
-def on_pieces(
-    path: Path, whole: LinkPatches, link: ModalBody, pieces: Mapping[str, tuple[float, ModalBody]]
-) -> LinkPatches:
+def on_pieces(whole: LinkPatches, link: ModalBody, pieces: Mapping[str, tuple[float, ModalBody]]) -> LinkPatches:
     """Return the patches of a link on its pieces as well: a patch across a cut acts on both sides of it.
 
     `pieces` by name from the root to the tip: where each begins, m from the root, and its modal body. Raises
     `InputError` for electrodes that a cut divides, and for shunts, which act at the frequencies of the link's modes.
     """
     cuts = np.array([start for start, _ in pieces.values()])[1:]
-    for label, array in whole.arrays.items():
+    for array in whole.arrays.values():
         layout, slack = array.layout, 1e-6 * array.layout.length
         if layout.shunt is not None:
-            key = f"{_key(path, label)}: shunt"
-            raise InputError(f"{key}: expected a link in one piece with a shunt", f"{len(pieces)} pieces")
+            expected = "shunt: expected a link in one piece with a shunt"
+            raise InputError(f"{_key(layout)}: {expected}", f"{len(pieces)} pieces")
         through = ((cuts > array.edges[:, :1] + slack) & (cuts < array.edges[:, 1:] - slack)).any(axis=0)
         if layout.gives_way and through.any():
             raise InputError(
-                f"{_key(path, label)}: electrodes: expected no cut between pieces through a patch with electrodes ="
-                ' "open"',
+                f'{_key(layout)}: electrodes: expected no cut between pieces through a patch with electrodes = "open"',
                 f"one at {cuts[through][0]:g} m: change pieces, or centers",
             )
-    body, bodies = whole.body, {whole.body: whole.bodies[whole.body]}
+    bodies = {whole.body: whole.bodies[whole.body]}
     driven = driven_patches(whole.arrays.values())
     spread = spread_of(link, list(pieces.values()))
     ends = np.cumsum([modal.mode_count for _, modal in pieces.values()])
@@ -245,7 +242,7 @@ def on_pieces(
         on_piece = whole.placed_on(start, modal.length)
         columns, k = [k for which, _ in on_piece for k in which], len(driven)
         (charge, turn), capacitance = np.zeros((2, modal.mode_count, k)), np.zeros((k, k))
-        found = effects(_key(path, body), [placed for _, placed in on_piece], modal) if on_piece else []
+        found = effects([placed for _, placed in on_piece], modal) if on_piece else []
         for (which, _), of in zip(on_piece, found, strict=True):
             charge[:, which], turn[:, which] = of.Phi_V.T, of.turn.T
             capacitance[np.ix_(which, columns)] = of.capacitance
@@ -253,28 +250,30 @@ def on_pieces(
     return replace(whole, bodies=bodies)
 
 
-def with_count(path: Path, layout: PztLayout, body: ModalBody, spatial: Body, count: int) -> LinkPatches | None:
+def with_count(layout: PztLayout, body: ModalBody, spatial: Body, count: int) -> LinkPatches | None:
     """Return `count` patches of a layout alone, evenly spaced, with one limit; None if they do not fit the link."""
     try:
-        return link_patches(path, [layout.with_one_limit(count=count, centers=None)], body, spatial)
+        return link_patches([layout.with_one_limit(count=count, centers=None)], body, spatial)
     except InputError:  # no room, a step of the section, weights for another number
         return None
 
 
-def _array(path: Path, placed: PlacedLayout, body: ModalBody, spatial: Body, of: Effects) -> PatchArray:
-    (layout, edges), key, modes = placed, _key(path, placed.layout.label), reached_modes(of.Phi_V, body, spatial)
+def _array(placed: PlacedLayout, body: ModalBody, spatial: Body, of: Effects) -> PatchArray:
+    (layout, edges), modes = placed, reached_modes(of.Phi_V, body, spatial)
     if not modes.served:
         families = ", ".join(dict.fromkeys(map(str, body.family[: body.eigenmode_count]))) or "none"
         raise InputError(
-            f'{key}: bends: expected eigenmodes of the link that patches for "{layout.bends}" reach',
+            f'{_key(layout)}: bends: expected eigenmodes of the link that patches for "{layout.bends}" reach',
             f"eigenmodes in {families}: add such modes ([modes] family, a larger count), or move the patches",
         )
     points = {name: modes.forces(at.translation @ spatial.on_file) for name, at in spatial.points.items()}
+    with naming(_key(layout)):
+        W_sqrt = weights(layout, modes.served, modes.stiffness, points)
     return PatchArray(
         modes=modes,
         Phi_V=modes.forces(of.Phi_V).T,
         amplifiers=layout.amplifiers(),
-        W_sqrt=weights(key, layout, modes.served, modes.stiffness, points),
+        W_sqrt=W_sqrt,
         layout=layout,
         edges=edges,
         effects=of,
@@ -284,19 +283,19 @@ def _array(path: Path, placed: PlacedLayout, body: ModalBody, spatial: Body, of:
 
 
 def _together(
-    path: Path, layouts: Sequence[PztLayout], arrays: Mapping[str, PatchArray], reached: ReachedModes, per_volt: Array
+    layouts: Sequence[PztLayout], arrays: Mapping[str, PatchArray], reached: ReachedModes, per_volt: Array
 ) -> Reach:
     """Reach of layouts side by side: all modal forces that are left count alike."""
     for layout in layouts:
         if layout.mode_weights is not None or layout.point_weights is not None:
             beside = f'with other layouts on "{layout.body}"'
-            raise InputError(f"{_key(path, layout.label)}: expected no weights {beside}", "them")
+            raise InputError(f"{_key(layout)}: expected no weights {beside}", "them")
     Phi_V = reached.forces(per_volt).T
     return Reach(reached, Phi_V, joined(arrays.values()), served_first(reached.served, *Phi_V.shape))
 
 
-def _key(path: Path, label: str) -> str:
-    return f'{path}: pzt "{label}"'
+def _key(layout: PztLayout, *others: PztLayout) -> str:
+    return f'pzt "{layout.body if others else layout.label}"'
 
 
 def on_kept_modes(of_link: LinkPatches, equations: Body) -> LinkPatches:

@@ -92,17 +92,17 @@ def served_first(served: int, n: int, patches: int) -> Array:
     return np.diag(np.where(np.arange(n) < served, 1.0, OF_STATIC_SHAPES))[:rows]
 
 
-def weights(key: str, layout: PztLayout, served: int, stiffness: Array, points: Mapping[str, Array]) -> Array:
+def weights(layout: PztLayout, served: int, stiffness: Array, points: Mapping[str, Array]) -> Array:
     """Return root weights W_sqrt (rows, n) of modes, or of deflections Φ(x) K⁻¹ r by unmet modal forces r at points.
 
     The first `served` of n modes have `stiffness` (n,), rad²/s², and at points by name Φ (components, n), 1/√kg. Raises
-    `InputError`, which begins with `key`, for weights that do not fit.
+    `InputError` for weights that do not fit.
     """
     order = served_first(served, len(stiffness), layout.patch_count)
     if layout.mode_weights is not None:
         if len(layout.mode_weights) != served:
             raise InputError(
-                f"{key}: mode_weights: expected {served} weights, one for each mode that the patches serve",
+                f"mode_weights: expected {served} weights, one for each mode that the patches serve",
                 len(layout.mode_weights),
             )
         shares = np.array(layout.mode_weights) / max(layout.mode_weights)
@@ -113,13 +113,11 @@ def weights(key: str, layout: PztLayout, served: int, stiffness: Array, points: 
         return order
     unknown = layout.point_weights.keys() - points.keys()
     if unknown:
-        raise InputError(
-            f"{key}: point_weights: expected points of the link, {', '.join(points)}", ", ".join(sorted(unknown))
-        )
+        raise InputError(f"point_weights: expected points of the link, {', '.join(points)}", ", ".join(sorted(unknown)))
     rows = np.vstack([np.sqrt(weight) * points[name] / stiffness for name, weight in layout.point_weights.items()])
     size = np.linalg.norm(rows, 2)
     if not size > 0.0:
-        raise InputError(f"{key}: point_weights: expected points that move with the modes", "none that do")
+        raise InputError("point_weights: expected points that move with the modes", "none that do")
     softest = np.sqrt(stiffness.min() / stiffness)
     return np.vstack([rows / size, np.sqrt(ENERGY_WEIGHT) * np.diag(softest)])
 
@@ -258,19 +256,19 @@ def patch_edges(layout: PztLayout, length: float) -> Array:
     return centers[:, None] + np.array([-0.5, 0.5]) * layout.length
 
 
-def check_edges(key: str, edges: Array, length: float) -> None:
+def check_edges(edges: Array, length: float) -> None:
     """Raise `InputError` for patches between `edges` (k, 2), m, beyond a link of that `length`, or on each other."""
     slack = 1e-9 * length
     for k, (start, end) in enumerate(edges, 1):
         if start < -slack or end > length + slack:
             raise InputError(
-                f"{key}: expected patches within the link, 0 … {length:g} m", f"patch {k} from {start:g} to {end:g} m"
+                f"expected patches within the link, 0 … {length:g} m", f"patch {k} from {start:g} to {end:g} m"
             )
     for k, following in pairwise(np.argsort(edges[:, 0])):
         if edges[following, 0] < edges[k, 1] - slack:
             first, second = sorted((k + 1, following + 1))
             (a, b), (c, d) = edges[first - 1], edges[second - 1]
             raise InputError(
-                f"{key}: expected patches side by side",
+                "expected patches side by side",
                 f"patch {first} ({a:g} to {b:g} m) and patch {second} ({c:g} to {d:g} m) on the same place",
             )

@@ -92,21 +92,21 @@ def link_sections(body: ModalBody) -> LinkSections:
     )
 
 
-def check_sections(key: str, body: ModalBody, normal: Literal["y", "z"], *, twists: bool) -> None:
+def check_sections(body: ModalBody, normal: Literal["y", "z"], *, twists: bool) -> None:
     """Raise `InputError` where the modal body lacks the width of sections or, if patches twist it, their outline."""
     if np.isnan(link_sections(body).extent(normal)).any():
         raise InputError(
-            f"{key}: expected a modal body file with the width of the link (stations/width)",
+            "expected a modal body file with the width of the link (stations/width)",
             "one of an earlier version: recompute it from its link file with `ffrobot link`",
         )
     if twists and body.stations.outline is None:
         raise InputError(
-            f'{key}: bends: expected a beam link for "twist"',
+            'bends: expected a beam link for "twist"',
             f"a {body.kind}: how twist shears its surface is not known",
         )
 
 
-def check_width(key: str, body: ModalBody, layout: PztLayout, edges: Array) -> None:
+def check_width(body: ModalBody, layout: PztLayout, edges: Array) -> None:
     """Raise `InputError` for patches between `edges` (k, 2), m, that are wider than the face that they lie on."""
     sections = link_sections(body)
     x, across = sections.x, sections.extent("z" if layout.normal == "y" else "y")
@@ -118,7 +118,7 @@ def check_width(key: str, body: ModalBody, layout: PztLayout, edges: Array) -> N
         k = int(beyond.argmax())
         where = f", {layout.offset:g} m off its axis," if layout.offset else ""
         raise InputError(
-            f"{key}: width: expected patches on the face of the link, {face[k]:.3g} m wide at {x[k]:.3g} m",
+            f"width: expected patches on the face of the link, {face[k]:.3g} m wide at {x[k]:.3g} m",
             f"patches {layout.width:g} m wide{where} which stand out: units are SI; is this in mm?",
         )
 

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from ..common.arrays import Array, Booleans, ComplexArray
-from ..common.errors import InputError, check_known, either, quoted
+from ..common.errors import InputError, check_known, either, naming, quoted
 from ..common.libraries import extras, scipy
 from ..common.rotations import of_rpy
 from ..common.structs import struct
@@ -45,11 +45,12 @@ def read_columns(path: Path) -> list[Column]:
     """Read all FRFs of a file. Raises `InputError` for a file of another kind, and for one without FRFs."""
     readers = {".uff": _universal, ".unv": _universal, ".58": _universal, ".csv": _of_csv, ".mat": _of_mat}
     suffix = path.suffix.lower()
-    if suffix not in readers:
-        raise InputError(f"{path}: expected a file with {quoted(readers)}", f'"{path.name}"')
-    columns = list(readers[suffix](path))
-    if not columns:
-        raise InputError(f"{path}: expected frequency response functions (type 4 of dataset 58)", "none")
+    with naming(path):
+        if suffix not in readers:
+            raise InputError(f"expected a file with {quoted(readers)}", f'"{path.name}"')
+        columns = list(readers[suffix](path))
+        if not columns:
+            raise InputError("expected frequency response functions (type 4 of dataset 58)", "none")
     return columns
 
 
@@ -64,7 +65,7 @@ def _universal(path: Path) -> Iterator[Column]:
         for one in sets:
             one["data"].real, one["x"], one["func_type"]
     except Exception:  # whatever pyuff finds in a file that is none
-        raise InputError(f"{path}: expected datasets 58 of a universal file", "damaged ones") from None
+        raise InputError("expected datasets 58 of a universal file", "damaged ones") from None
     ends = [(one["ref_node"], one["ref_dir"], one["rsp_node"], one["rsp_dir"]) for one in sets]
     coherence = {at: one["data"].real for at, one in zip(ends, sets, strict=True) if one["func_type"] == 6}
     for at, one in zip(ends, sets, strict=True):
@@ -73,20 +74,19 @@ def _universal(path: Path) -> Iterator[Column]:
         kind, by = one["ordinate_spec_data_type"], one["orddenom_spec_data_type"]
         if kind not in ORDERS or by != FORCE:
             raise InputError(
-                f"{path}: node {at[2]}: expected displacement, velocity or acceleration (data types 8, 11, 12) per"
-                " force (13)",
+                f"node {at[2]}: expected displacement, velocity or acceleration (data types 8, 11, 12) per force (13)",
                 f"types {kind} and {by}",
             )
-        force, response = (f"{node:g}/{_axis(path, axis)}" for node, axis in (at[:2], at[2:]))
+        force, response = (f"{node:g}/{_axis(axis)}" for node, axis in (at[:2], at[2:]))
         label = str(one["ordinate_axis_units_lab"]).strip().lower()
         is_si = label in ("", "none", *LABELS[ORDERS[kind]])
         frequency, values = np.asarray(one["x"], float), one["data"].astype(complex)
         yield Column(force, response, frequency, values, coherence.get(at), order=ORDERS[kind], is_si=is_si)
 
 
-def _axis(path: Path, code: float) -> str:
+def _axis(code: float) -> str:
     if abs(code) not in (1, 2, 3):
-        raise InputError(f"{path}: expected translations along x, y, z (directions ±1, ±2, ±3)", f"{code:g}")
+        raise InputError("expected translations along x, y, z (directions ±1, ±2, ±3)", f"{code:g}")
     return "-" * (code < 0) + "xyz"[int(abs(code)) - 1]
 
 
@@ -94,11 +94,11 @@ def _of_csv(path: Path) -> Iterator[Column]:
     """FRFs of a table with a line for each frequency of each function."""
     header, table = read_labelled_csv(path, "table of FRFs")
     for name in header:
-        check_known(name, COLUMNS, f"{path}: line 1: expected columns among {quoted(COLUMNS)}")
+        check_known(name, COLUMNS, f"line 1: expected columns among {quoted(COLUMNS)}")
     if missing := [name for name in COLUMNS[:-1] if name not in header]:
-        raise InputError(f"{path}: line 1: expected the columns {quoted(COLUMNS[:-1])}", f"no {quoted(missing)}")
+        raise InputError(f"line 1: expected the columns {quoted(COLUMNS[:-1])}", f"no {quoted(missing)}")
     if not table:
-        raise InputError(f"{path}: expected a line for each frequency of each function below line 1", "none")
+        raise InputError("expected a line for each frequency of each function below line 1", "none")
     functions: dict[tuple[str, ...], list[list[float]]] = {}
     for line, cells in table:
         numbers = []
@@ -106,7 +106,7 @@ def _of_csv(path: Path) -> Iterator[Column]:
             try:
                 numbers.append(float(cell))
             except ValueError:
-                raise InputError(f"{path}: line {line}: expected a number", f'"{shown(cell)}"') from None
+                raise InputError(f"line {line}: expected a number", f'"{shown(cell)}"') from None
         functions.setdefault(tuple(cells[end] for end in ENDS), []).append(numbers)
     for (force, response), rows in functions.items():
         values = np.array(rows)
@@ -120,23 +120,21 @@ def _of_mat(path: Path) -> Iterator[Column]:
     try:
         data = scipy.io.loadmat(content, chars_as_strings=True)
     except Exception:  # whatever SciPy finds in a file that is none
-        raise InputError(
-            f"{path}: expected a .mat file of version 7 or older (MATLAB: save -v7)", "another file"
-        ) from None
+        raise InputError("expected a .mat file of version 7 or older (MATLAB: save -v7)", "another file") from None
     if missing := [name for name in ("frequency", "H", *ENDS) if name not in data]:
-        raise InputError(f"{path}: expected variables frequency, H, force and response", f"no {quoted(missing)}")
+        raise InputError("expected variables frequency, H, force and response", f"no {quoted(missing)}")
     try:
         frequency, H = data["frequency"].ravel().astype(float), data["H"].astype(complex)
         ends = [[str(np.ravel(one)[0]).strip() for one in data[name].ravel()] for name in ENDS]
         coherence = data["coherence"].astype(float) if "coherence" in data else np.full(H.shape, np.nan)
     except (ValueError, TypeError, IndexError):
         raise InputError(
-            f"{path}: expected numbers in frequency, H and coherence, and names in force and response", "others"
+            "expected numbers in frequency, H and coherence, and names in force and response", "others"
         ) from None
     shape = (len(frequency), len(ends[0]))
     if not shape == H.shape == coherence.shape == (len(frequency), len(ends[1])):
         raise InputError(
-            f"{path}: expected H and coherence with a line for each frequency and a column for each force and response",
+            "expected H and coherence with a line for each frequency and a column for each force and response",
             f"H of shape {H.shape} for {shape[0]} frequencies, {shape[1]} forces and {len(ends[1])} responses",
         )
     for k, (force, response) in enumerate(zip(*ends, strict=True)):
@@ -266,11 +264,11 @@ def _read(path: Path, test: ResponseTest) -> MeasuredPose:
         raise InputError(f'{path}: test "{test.name}": band: expected frequencies of the file within it', "none")
     responses = []
     for column in columns:
-        where = f"{test.file}: {column.force} → {column.response}"
-        if len(column.frequency) != len(frequency) or not np.allclose(column.frequency, frequency, rtol=1e-9):
-            raise InputError(f"{where}: expected the frequencies of the other functions", "others")
-        _check(where, column, inside)
-        responses.append(_response(where, test, column, inside))
+        with naming(f"{test.file}: {column.force} → {column.response}"):
+            if len(column.frequency) != len(frequency) or not np.allclose(column.frequency, frequency, rtol=1e-9):
+                raise InputError("expected the frequencies of the other functions", "others")
+            _check(column, inside)
+            responses.append(_response(test, column, inside))
     force, response, receptance, coherence = zip(*responses, strict=True)
     if test.averages is not None and np.isnan(coherence).any():
         raise InputError(f'{path}: test "{test.name}": averages: expected them with a coherence in the file', "none")
@@ -278,49 +276,47 @@ def _read(path: Path, test: ResponseTest) -> MeasuredPose:
     return MeasuredPose(test, frequency[inside], force, response, *of_columns)
 
 
-def _check(where: str, column: Column, inside: Booleans) -> None:
+def _check(column: Column, inside: Booleans) -> None:
     """Refuse numbers that no FRF has."""
     at, values = column.frequency[inside], column.values[inside]
     if not (np.diff(column.frequency) > 0.0).all():
-        raise InputError(f"{where}: expected each frequency once, in rising order", "others")
+        raise InputError("expected each frequency once, in rising order", "others")
     if not at.min() > 0.0:
         raise InputError(
-            f"{where}: expected frequencies above 0 Hz",
+            "expected frequencies above 0 Hz",
             f"{at.min():g}: the key band, such as [5.0, 200.0], leaves them out",
         )
     if not (np.isfinite(values).all() and np.abs(values).all()):
-        raise InputError(f"{where}: expected finite values that are not 0", "others")
+        raise InputError("expected finite values that are not 0", "others")
     if len(at) > 1 and (values.real > 0.0).all() and not values.imag.any():
-        raise InputError(f"{where}: expected complex values", "positive real ones: a magnitude is no FRF")
+        raise InputError("expected complex values", "positive real ones: a magnitude is no FRF")
     coherence = np.ones(1) if column.coherence is None else column.coherence[inside]
     if not ((coherence >= 0.0) & (coherence <= 1.0)).all():
         worst = coherence[np.nan_to_num(np.abs(coherence - 0.5), nan=np.inf).argmax()]
-        raise InputError(f"{where}: coherence: expected values from 0 to 1", f"{worst:g}")
+        raise InputError("coherence: expected values from 0 to 1", f"{worst:g}")
 
 
-def _response(
-    where: str, test: ResponseTest, column: Column, inside: Booleans
-) -> tuple[Direction, Direction, ComplexArray, Array]:
+def _response(test: ResponseTest, column: Column, inside: Booleans) -> tuple[Direction, Direction, ComplexArray, Array]:
     """Directions of force and response, receptance (F,), m/N, and coherence (F,), NaN where unknown."""
     order, factor = UNITS[test.unit] if test.unit else (column.order, 1.0)
     if test.unit is None and not column.is_si:
-        raise InputError(f"{where}: expected the key unit of the test, one of {quoted(UNITS)}", "none")
+        raise InputError(f"expected the key unit of the test, one of {quoted(UNITS)}", "none")
     if order is None or column.order not in (None, order):
         units = either(unit for unit, (of, _) in UNITS.items() if of == column.order)
-        raise InputError(f"{where}: unit: expected that of the file, {units}", f'"{test.unit}"')
+        raise InputError(f"unit: expected that of the file, {units}", f'"{test.unit}"')
     axes = of_rpy(*test.rpy)
-    force, response = (_direction(where, text, test.points, axes) for text in (column.force, column.response))
+    force, response = (_direction(text, test.points, axes) for text in (column.force, column.response))
     receptance = column.values[inside] * factor / (2j * np.pi * column.frequency[inside]) ** order
     coherence = np.full(len(receptance), np.nan) if column.coherence is None else column.coherence[inside]
     return force, response, receptance, coherence
 
 
-def _direction(where: str, text: str, points: Mapping[str, str], axes: Array) -> Direction:
+def _direction(text: str, points: Mapping[str, str], axes: Array) -> Direction:
     name, _, axis = text.rpartition("/")
     sign, letter = (-1.0 if axis.startswith("-") else 1.0), axis.lstrip("+-")
     if not name or len(letter) != 1 or letter not in "xyz":
-        raise InputError(f"{where}: expected POINT/x, POINT/-z, …", f'"{shown(text)}"')
+        raise InputError("expected POINT/x, POINT/-z, …", f'"{shown(text)}"')
     if name not in points and "." not in name:
-        raise InputError(f'{where}: points: expected the point of the robot for "{shown(name)}"', "none")
+        raise InputError(f'points: expected the point of the robot for "{shown(name)}"', "none")
     x, y, z = (sign * axes[:, "xyz".index(letter)]).tolist()
     return Direction(points.get(name, name), (x, y, z))

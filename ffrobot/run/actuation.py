@@ -11,7 +11,7 @@ import numpy as np
 from ..actuation.patches.records import by_body
 from ..actuation.points import PointSet, make_point_set
 from ..common.arrays import Array, Indices
-from ..common.errors import InputError
+from ..common.errors import InputError, naming
 from ..common.structs import struct
 from ..mbs._core import TimeFunction
 from ..mbs.fields.waypoints import spline
@@ -56,25 +56,25 @@ def make_patches(scene: Scene, bodies: Bodies) -> dict[str, LinkPatches]:
     from ..actuation.patches.link_patches import check_reach, link_patches, on_kept_modes
 
     patches = {}
-    for name, layouts in by_body(scene.pzt):
-        body = bodies[name]
-        assert body.modal is not None
-        of_link = link_patches(scene.path, layouts, body.modal, body.carrying)
-        patches[name] = on_kept_modes(of_link, body.spatial)
-    if scene.trajectory and any(analysis.allocates_patches for analysis in scene.analysis):
-        for of_link in patches.values():
-            check_reach(scene.path, of_link)
+    with naming(scene.path):
+        for name, layouts in by_body(scene.pzt):
+            body = bodies[name]
+            assert body.modal is not None
+            patches[name] = on_kept_modes(link_patches(layouts, body.modal, body.carrying), body.spatial)
+        if scene.trajectory and any(analysis.allocates_patches for analysis in scene.analysis):
+            for of_link in patches.values():
+                check_reach(of_link)
     return patches
 
 
 def points_3d(scene: Scene, bodies: Bodies) -> dict[str, PointSet]:
     """Actuation points by body. Raises `InputError` for points that do not fit their body."""
-    return {
-        layout.body: make_point_set(
-            scene.path, layout, bodies[layout.body].modal, bodies[layout.body].spatial, SPACES[scene.space]
-        )
-        for layout in scene.actuation_points
-    }
+    points = {}
+    for layout in scene.actuation_points:
+        body = bodies[layout.body]
+        with naming(f'{scene.path}: actuation_points "{layout.body}"'):
+            points[layout.body] = make_point_set(layout, body.modal, body.spatial, SPACES[scene.space])
+    return points
 
 
 def given_voltages(scene: Scene, model: Model, patches: Mapping[str, LinkPatches]) -> Iterator[Drive]:
@@ -136,4 +136,4 @@ def find_actuation(scene: Scene, run: Run, bodies: Bodies, patches: Mapping[str,
     applied = {getattr(one, "apply", None) for one in scene.analysis if one.source == analysis.name}
     if analysis.supplies_all or applied & {"trajectory", "points"}:  # forces there need no modal forces
         others |= links.keys()
-    return Actuation(voltages, unmet, judge_actuators(scene.path, run, links, patches, voltages, others))
+    return Actuation(voltages, unmet, judge_actuators(run, links, patches, voltages, others))

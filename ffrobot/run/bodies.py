@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from ..actuation.patches.records import by_body
-from ..common.errors import InputError, did_you_mean, of_file, quoted
+from ..common.errors import InputError, did_you_mean, naming, of_file, quoted
 from ..common.structs import struct
 from ..fe_models.link_records.families import FAMILIES, Family
 from ..fe_models.modal_body import ModalBody
@@ -110,8 +110,9 @@ def load_bodies(scene: Scene, stage: Callable[[str], None]) -> dict[str, LoadedB
             from ..actuation.patches.link_patches import link_patches, placed_patches
 
             assert body.modal is not None
-            link_patches(scene.path, patches[name], body.modal, carrying)  # refuses patches that do not fit
-            body = with_structure(body, placed_patches(scene.path, patches[name], body.modal))
+            with naming(scene.path):
+                link_patches(patches[name], body.modal, carrying)  # refuses patches that do not fit
+                body = with_structure(body, placed_patches(patches[name], body.modal))
         if scene.is_planar:
             body = replace(body, spatial=projected(body.spatial), carrying=projected(body.carrying))
         loaded[name] = body

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..actuation.points import PointSet, with_points
+from ..common.errors import naming
 from ..mbs.linear.vibration import with_robot_damping
 from ..mbs.model.body import Body
 from ..mbs.model.build import build_model
@@ -93,7 +94,8 @@ def with_pieces(solution: Solution, counts: Mapping[str, int], watcher: Watcher)
 
         links, starts = links_of(parts), dict(zip(divided[name].names, divided[name].cut.starts, strict=True))
         pieces = {piece: (start, links[piece]) for piece, start in starts.items()}
-        patches[name] = on_pieces(solution.scene.path, patches[name], solution.links[name], pieces)
+        with naming(solution.scene.path):
+            patches[name] = on_pieces(patches[name], solution.links[name], pieces)
         for piece, start in starts.items():
             on_piece = [one for _, one in patches[name].placed_on(start, parts[piece].spatial.length or 0.0)]
             parts[piece] = with_structure(parts[piece], on_piece)

@@ -22,7 +22,7 @@ def planar_body(body, name="link"):
 def patched(body, *layouts, bare=None):
     """The link, in 3D unless `bare` is given, with mass and stiffness of its patches."""
     bare = from_modal_body("link", body) if bare is None else bare
-    return patched_body(bare, body, placed_patches(SCENE, layouts, body))
+    return patched_body(bare, body, placed_patches(layouts, body))
 
 
 def layout(body="link", **keys):
@@ -32,7 +32,7 @@ def layout(body="link", **keys):
 
 def on_link(body, planar=None, **keys):
     """All patches of one layout on the link, `planar` with payloads or with fewer modes."""
-    return link_patches(SCENE, [layout(**keys)], body, planar_body(body) if planar is None else planar)
+    return link_patches([layout(**keys)], body, planar_body(body) if planar is None else planar)
 
 
 def patches(body, planar=None, **keys):

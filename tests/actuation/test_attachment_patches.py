@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from beam_links import modal_body, paper_link
-from patches_on_links import SCENE, on_link, planar_body
+from patches_on_links import on_link, planar_body
 
 from ffrobot.actuation.patches.link_patches import check_reach, on_kept_modes
 from ffrobot.actuation.patches.patches import voltage_gain
@@ -19,7 +19,7 @@ def bodies():
 
 def test_ten_patches_on_ten_modes_are_exact(bodies):
     attached, plain = (on_link(body) for body in bodies)
-    check_reach(SCENE, attached)
+    check_reach(attached)
     assert attached.Phi_V.shape == (12, 10)
     assert np.array_equal(attached.Phi_V[:10], plain.Phi_V)
     assert attached.reach.condition_number == pytest.approx(plain.reach.condition_number, rel=1e-9)
@@ -66,11 +66,11 @@ def test_too_few_patches_serve_the_modes_kept(bodies, fewer, count):
     left = F_kept - (V @ of_link.Phi_V.T) @ fewer.modal_transform
     np.testing.assert_allclose(of_link.unmet(F_p, V) @ fewer.modal_transform, left, atol=1e-12 * np.abs(F_kept).max())
     if count >= 4:
-        check_reach(SCENE, of_link)
+        check_reach(of_link)
         assert np.abs(left[:, :4]).max() < 1e-8
     else:
         with pytest.raises(InputError, match=r"as many patches as modes \(4\) or more, found 3"):
-            check_reach(SCENE, of_link)
+            check_reach(of_link)
 
 
 @pytest.mark.parametrize("weights", [{}, {"mode_weights": (1.0,) * 10}, {"point_weights": {"tip": 1.0}}])

@@ -49,7 +49,7 @@ def test_open_patches_along_a_cantilever_under_a_force_at_its_tip(strip, count):
         body = patched(strip, one := layout(electrodes=electrodes, **keys))
         tip = body.points["tip"].translation[1]
         assert tip**2 @ (1.0 / body.stiffness) == pytest.approx(expected, rel=1e-6)
-    volts = volts_on_file(link_patches(SCENE, [one], strip, body), "strip")["strip"] @ body.modal_transform
+    volts = volts_on_file(link_patches([one], strip, body), "strip")["strip"] @ body.modal_transform
     assert volts @ (tip / body.stiffness) == pytest.approx(-V, rel=1e-6)
 
 
@@ -73,7 +73,7 @@ def test_resistor_against_the_charge_as_a_state(strip, share):
     )
     exact = np.linalg.eigvals(A)
     exact = exact[np.argsort(np.abs(exact - 1j * omega[0]))[0]]
-    driven = link_patches(SCENE, [layout(**PLACE)], strip, shorted)
+    driven = link_patches([layout(**PLACE)], strip, shorted)
     C = np.sum((shorted.modal_transform.T @ driven.Phi_V[:, 0]) ** 2) / (Phi @ Phi)
     body = patched(strip, layout(shunt=lag / C, **PLACE))
     Z, I = np.zeros((n, n)), np.eye(n)  # noqa: E741
@@ -93,7 +93,7 @@ def test_readings_of_a_patch_under_a_force_at_the_tip(electrodes, face, offset, 
     body = modal_body(LINK | {"modes": keys})
     keys = PATCH | PLACE | {"width": w, "face": face, "offset": offset, "electrodes": electrodes}
     spatial = patched(body, one := validate(PztLayout, keys, SCENE, None, "spatial"))
-    volts = volts_on_file(link_patches(SCENE, [one], body, spatial), "strip")["strip"] @ spatial.modal_transform
+    volts = volts_on_file(link_patches([one], body, spatial), "strip")["strip"] @ spatial.modal_transform
     found = volts[0] @ (force @ spatial.points["tip"].translation / spatial.stiffness)
     faces, sign = (2, 0.0) if face == "both" else (1, 1.0)
     A, arm, I = (faces * w * np.diff([(H / 2) ** k, (H / 2 + T_P) ** k])[0] / k for k in (1, 2, 3))  # noqa: E741
@@ -116,8 +116,8 @@ def test_voltages_leave_out_passive_patches(strip):
         layout(name=name, centers=[x], length=0.1, allocation="least-squares", **keys)
         for name, x, keys in (("driven", 0.06, {}), ("sensor", 0.2, {"electrodes": "open"}))
     )
-    alone, both = (link_patches(SCENE, layouts, strip, spatial) for layouts in ([driven], [driven, open_]))
-    only = link_patches(SCENE, [open_], strip, spatial)
+    alone, both = (link_patches(layouts, strip, spatial) for layouts in ([driven], [driven, open_]))
+    only = link_patches([open_], strip, spatial)
     F_p = np.ones((1, strip.mode_count))
     found = both.voltages(F_p)
     assert found["sensor"].required.tolist() == [[0.0]]

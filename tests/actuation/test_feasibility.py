@@ -86,7 +86,7 @@ def test_remedies_do(word):
 
     def factor(**keys):
         changed, body = layout.model_copy(update=keys), solution.bodies["link"]
-        other = link_patches(solution.scene.path, [changed], body.modal, body.carrying)
+        other = link_patches([changed], body.modal, body.carrying)
         return np.abs(other.voltages(F_p)["link"].required / other.amplifiers.range[1]).max()
 
     match word:
@@ -114,7 +114,7 @@ def test_number_of_patches_that_would_do():
     layout, body = solution.patches["link"].arrays["link"].layout, solution.bodies["link"]
 
     def needs(count):
-        other = with_count(solution.scene.path, layout, body.modal, body.carrying, count)
+        other = with_count(layout, body.modal, body.carrying, count)
         return other and np.abs(other.voltages(modal_forces(solution))["link"].required).max()
 
     assert needs(21) is None  # 21 × 0.05 m on 1 m

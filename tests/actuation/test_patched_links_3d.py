@@ -41,7 +41,7 @@ def layout(**keys):
 def tip(body, layouts, volts=None):
     """Φp (3,) and Φ_r p (3,) of the tip under a voltage on all patches, statically, with what the patches stiffen."""
     spatial = patched(body, *layouts)
-    found = link_patches(SCENE, layouts, body, spatial)
+    found = link_patches(layouts, body, spatial)
     V = np.full(found.Phi_V.shape[1], VOLT) if volts is None else np.asarray(volts, dtype=float)
     p = spatial.modal_transform.T @ (found.Phi_V @ V) / spatial.stiffness
     at = spatial.points["tip"]
@@ -223,10 +223,10 @@ def test_voltages_of_two_planes_do_not_disturb_each_other():
         layout(name="up", bends="out-of-plane", count=3, length=0.05, limit=200.0),
     )
     F_p = np.random.default_rng(0).standard_normal((3, spatial.n_modes))
-    together = link_patches(SCENE, [side, up], body, spatial)
+    together = link_patches([side, up], body, spatial)
     found = together.voltages(F_p)
     for one in (side, up):
-        alone = link_patches(SCENE, [one], body, spatial).voltages(F_p)[one.label]
+        alone = link_patches([one], body, spatial).voltages(F_p)[one.label]
         np.testing.assert_allclose(found[one.label].required, alone.required, rtol=1e-8, atol=1e-8 * alone.largest)
         np.testing.assert_allclose(found[one.label].within_limit, alone.within_limit, atol=1e-4)
     unmet = together.unmet(F_p, np.concatenate([found[name].within_limit for name in ("side", "up")], axis=1))
@@ -236,7 +236,7 @@ def test_voltages_of_two_planes_do_not_disturb_each_other():
 
 def test_field_between_interdigitated_electrodes():
     body, time, F_p = link(SQUAT), np.arange(2.0), np.eye(2, 12)
-    of_link = link_patches(SCENE, [layout(fibre_angle=0.0)], body, from_modal_body("link", body))
+    of_link = link_patches([layout(fibre_angle=0.0)], body, from_modal_body("link", body))
     array, volts = of_link.arrays["link"], of_link.voltages(F_p @ np.eye(12, body.mode_count))["link"]
     forces = np.zeros((2, len(array.Phi_V)))
     judged = judge_patches(array, volts, time, forces, forces, None)
@@ -266,28 +266,28 @@ def test_patches_that_do_not_fit_their_link():
     body = link(SQUAT)
     spatial = from_modal_body("link", body)
     with pytest.raises(InputError, match=r'pzt "up": expected patches within the link'):
-        link_patches(SCENE, [layout(name="up", centers=[0.39], length=0.06)], body, spatial)
+        link_patches([layout(name="up", centers=[0.39], length=0.06)], body, spatial)
     with pytest.raises(InputError, match=r"expected as many patches as modes \(\d+\) or more, found 1"):
-        check_reach(SCENE, link_patches(SCENE, [layout(allocation="exact")], body, spatial))
+        check_reach(link_patches([layout(allocation="exact")], body, spatial))
     for wide in ({"width": 0.015}, {"width": 0.01, "offset": 0.003, "face": "+y"}):
         with pytest.raises(InputError, match=r"width: expected patches on the face of the link, 0.014 m wide at 0"):
-            link_patches(SCENE, [layout(**wide)], body, spatial)
+            link_patches([layout(**wide)], body, spatial)
     old = replace(body, stations=replace(body.stations, width=None, outline=None))
     with pytest.raises(InputError, match="recompute it from its link file"):
-        link_patches(SCENE, [layout(bends="out-of-plane")], old, spatial)
+        link_patches([layout(bends="out-of-plane")], old, spatial)
     upright = link(SQUAT, 4, "out-of-plane-bending")
     for allocation in ("exact", "least-squares"):
         with pytest.raises(
             InputError, match=r'bends: expected eigenmodes of the link that patches for "in-plane" reach'
         ):
-            link_patches(SCENE, [layout(allocation=allocation)], upright, from_modal_body("link", upright))
+            link_patches([layout(allocation=allocation)], upright, from_modal_body("link", upright))
     few = link(SQUAT, 3)  # torsion among its attachment modes only
     assert "torsion" in few.family
     assert "torsion" not in few.family[: few.eigenmode_count]
     twisting = layout(bends="twist", face="both", fibre_angle=np.pi / 4)
     with pytest.raises(InputError, match=r"found eigenmodes in (?!.*torsion).*: add such modes .*a larger count"):
-        link_patches(SCENE, [twisting], few, from_modal_body("link", few))
-    link_patches(SCENE, [twisting], body, spatial)  # the remedy: a larger count
+        link_patches([twisting], few, from_modal_body("link", few))
+    link_patches([twisting], body, spatial)  # the remedy: a larger count
     with pytest.raises(InputError, match="expected no weights with other layouts"):
-        link_patches(SCENE, [layout(name="a", point_weights={"tip": 1.0}), layout(name="b", bends="out-of-plane")],
+        link_patches([layout(name="a", point_weights={"tip": 1.0}), layout(name="b", bends="out-of-plane")],
                      body, spatial)  # fmt: skip

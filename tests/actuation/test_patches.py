@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from beam_links import modal_body, paper_link
-from patches_on_links import SCENE, layout, modes_in_the_plane, on_link, patches, planar_body
+from patches_on_links import layout, modes_in_the_plane, on_link, patches, planar_body
 
 from ffrobot.actuation.patches.link_patches import check_reach, link_patches
 from ffrobot.actuation.patches.patches import solve_voltages
@@ -49,15 +49,15 @@ def test_modes_that_no_patch_reaches_are_named():
     """Mode 4 of a supported beam has nodes of curvature at its quarters, where all four patches are."""
     body = modal_body(paper_link("simply-supported", 4))
     layouts = [layout(name="three", centers=(0.25, 0.5, 0.75)), layout(name="one", centers=(0.25,))]
-    of_link = link_patches(SCENE, layouts, body, planar_body(body))
+    of_link = link_patches(layouts, body, planar_body(body))
     assert list(of_link.reach.unreached_modes) == [3]
     frequency = (4 * np.pi) ** 2 / (2 * np.pi) * np.sqrt(EI / (7850.0 * 0.025 * 0.015))
     message = r"singular Φ_V \(condition number .*\): no voltages serve mode 4 \(.* Hz\); move patches"
     with pytest.raises(InputError, match=message) as caught:
-        check_reach(SCENE, of_link)
+        check_reach(of_link)
     assert float(str(caught.value).split("mode 4 (")[1].split(" Hz")[0]) == pytest.approx(frequency, rel=2e-4)
     one = [each.model_copy(update={"allocation": "least-squares"}) for each in layouts]
-    check_reach(SCENE, link_patches(SCENE, one, body, planar_body(body)))
+    check_reach(link_patches(one, body, planar_body(body)))
 
 
 def test_patches_that_only_bend_leave_axial_modes_as_they_are(all_modes):
@@ -69,7 +69,7 @@ def test_patches_that_only_bend_leave_axial_modes_as_they_are(all_modes):
     for face, rows in ((None, bending), ("+y", moving)):
         of_link = on_link(all_modes, count=len(moving), face=face)
         assert list(of_link.reach.modes.rows) == list(rows)
-        check_reach(SCENE, of_link)
+        check_reach(of_link)
         left = of_link.unmet(F_p, of_link.voltages(F_p)["link"].required)
         np.testing.assert_allclose(left[:, rows], 0.0, atol=1e-8)
         np.testing.assert_array_equal(np.delete(left, rows, axis=1), np.delete(F_p, rows, axis=1))

@@ -50,7 +50,7 @@ def test_one_patch_on_a_strip(strip, name, close, of_charge):
     found = solid.frequency("shorted"), solid.frequency("open")
     assert shorted == pytest.approx(found[0], rel=0.005)
     assert opened / shorted - 1 == pytest.approx(found[1] / found[0] - 1, rel=of_charge)
-    of_link = link_patches(SCENE, layouts[:1], strip, bodies[0])
+    of_link = link_patches(layouts[:1], strip, bodies[0])
     p = bodies[0].modal_transform.T @ of_link.Phi_V[:, 0] / bodies[0].stiffness
     moved, expected = bodies[0].points["tip"].translation @ p, solid.tip_per_volt()
     assert moved[1] == pytest.approx(expected[1], rel=close)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from beam_links import modal_body, paper_link
-from patches_on_links import SCENE, on_link
+from patches_on_links import on_link
 
 from ffrobot.actuation.patches.link_patches import check_reach
 from ffrobot.actuation.patches.patches import solve_voltages
@@ -17,7 +17,7 @@ def test_nearly_the_same_place(apart):
     """
     centers = (0.33, 0.33 + apart, 0.5, 0.7, 0.9)
     of_link = on_link(modal_body(paper_link(count=5)), centers=centers, length=0.5 * apart)
-    check_reach(SCENE, of_link)
+    check_reach(of_link)
     array, wanted = of_link.reach, np.random.default_rng(3).standard_normal((20, 5)) / np.arange(1, 6)
     left = np.abs(solve_voltages(array, wanted).unmet).max() / np.abs(wanted).max()
     assert left < np.finfo(float).eps * array.condition_number
