@@ -288,7 +288,7 @@ def _odd(root: Element) -> Iterable[str]:
     """Remarks on angles of more than a turn, and on repeated elements, of which the first counts, as in urdfdom."""
     for each in (*root.findall("link"), *root.findall("joint")):
         turned = each.find("inertial") if each.tag == "link" else each
-        rpy = (0.0, 0.0, 0.0) if turned is None else _origin(turned, each.tag).rpy
+        rpy = (0.0, 0.0, 0.0) if turned is None else _origin(turned).rpy
         if max(map(abs, rpy)) > 2 * math.pi:
             angles = " ".join(f"{angle:g}" for angle in rpy)
             yield f"{_label(each)}: rpy {angles} is more than a turn: URDF has rad, not degrees"
@@ -355,14 +355,14 @@ SIZES: Mapping[Shape, Mapping[str, int]] = {
 """Attributes of shapes, with their count of numbers."""
 
 
-def _text(element: Element, key: str, label: str, default: str = "") -> str:
+def _text(element: Element, key: str, default: str = "") -> str:
     if not (text := element.get(key, default)):
-        raise InputError(f"{label}: expected the attribute {key}", "none")
+        raise InputError(f"<{element.tag}>: expected the attribute {key}", "none")
     return text
 
 
 def _name(element: Element) -> str:
-    return _text(element, "name", f"<{element.tag}>")
+    return _text(element, "name")
 
 
 def _label(element: Element) -> str:
@@ -370,40 +370,40 @@ def _label(element: Element) -> str:
 
 
 def _link(element: Element) -> UrdfLink:
-    label, part = _label(element), element.find("inertial")
-    inertial = None if part is None else _inertial(part, f"{label}: <inertial>")
-    return UrdfLink(
-        _name(element), inertial, *(tuple(_shapes(element, kind, label)) for kind in ("visual", "collision"))
-    )
+    with naming(_label(element)):
+        part = element.find("inertial")
+        inertial = None if part is None else _inertial(part)
+        return UrdfLink(_name(element), inertial, *(tuple(_shapes(element, kind)) for kind in ("visual", "collision")))
 
 
-def _inertial(element: Element, label: str) -> Inertial:
+@naming("<inertial>")
+def _inertial(element: Element) -> Inertial:
     of_mass, inertia = element.find("mass"), element.find("inertia")
     if of_mass is None:
-        raise InputError(f'{label}: expected <mass value="…"/>', "none")
-    mass = _number(of_mass, "value", f"{label}: <mass>")
+        raise InputError('expected <mass value="…"/>', "none")
+    mass = _number(of_mass, "value")
     if inertia is None:
-        raise InputError(f"{label}: expected <inertia>", "none")
-    values = {key: _number(inertia, key, f"{label}: <inertia>") for key in ENTRIES}
+        raise InputError("expected <inertia>", "none")
+    values = {key: _number(inertia, key) for key in ENTRIES}
     J = np.array([[values["i" + "".join(sorted(a + b))] for b in "xyz"] for a in "xyz"])
     if mass < 0:
-        raise InputError(f"{label}: <mass>: expected a mass not below 0", f"{mass:g}")
-    origin = _origin(element, label)
+        raise InputError("<mass>: expected a mass not below 0", f"{mass:g}")
+    origin = _origin(element)
     C = of_rpy(*origin.rpy)
     return Inertial(mass, np.array(origin.xyz), C @ J @ C.T if any(origin.rpy) else J)
 
 
-def _shapes(link: Element, kind: str, label: str) -> Iterable[MeshFile | Primitive]:
+def _shapes(link: Element, kind: str) -> Iterable[MeshFile | Primitive]:
     for element in link.findall(kind):
-        where = f"{label}: <{kind}>"
-        for geometry in element.iterfind("geometry/*"):
-            if geometry.tag == "mesh" and (filename := geometry.get("filename")):
-                scale = _numbers(geometry, "scale", f"{where}: <mesh>", "1 1 1")
-                yield MeshFile(filename, three(scale), _origin(element, where))
-            for shape, counts in SIZES.items():
-                if geometry.tag == shape:
-                    sizes = (size for key, count in counts.items() for size in _sizes(geometry, key, count))
-                    yield Primitive(shape, tuple(sizes), _origin(element, where))
+        with naming(f"<{kind}>"):
+            for geometry in element.iterfind("geometry/*"):
+                if geometry.tag == "mesh" and (filename := geometry.get("filename")):
+                    scale = _numbers(geometry, "scale", "1 1 1")
+                    yield MeshFile(filename, three(scale), _origin(element))
+                for shape, counts in SIZES.items():
+                    if geometry.tag == shape:
+                        sizes = (size for key, count in counts.items() for size in _sizes(geometry, key, count))
+                        yield Primitive(shape, tuple(sizes), _origin(element))
 
 
 def _sizes(shape: Element, key: str, count: int) -> tuple[float, ...]:
@@ -416,83 +416,81 @@ def _sizes(shape: Element, key: str, count: int) -> tuple[float, ...]:
 
 
 def _joint(element: Element) -> UrdfJoint:
-    label, kind = _label(element), element.get("type", "")
-    check_known(kind, TYPES, f"{label}: type: expected one of {quoted(TYPES)}")
-    axis = element.find("axis")
-    along = (1.0, 0.0, 0.0) if axis is None else three(_numbers(axis, "xyz", f"{label}: <axis>", "1 0 0"))
-    if not any(along) and kind in WITH_AXIS:
-        raise InputError(f"{label}: <axis>: expected a direction", "0 0 0")
-    return UrdfJoint(
-        name=_name(element),
-        type=kind,
-        parent=_end(element, "parent", label),
-        child=_end(element, "child", label),
-        origin=_origin(element, label),
-        axis=along,
-        limits=_attributes(element, "limit", label),
-        dynamics=_attributes(element, "dynamics", label),
-        mimic=_mimic(element.find("mimic"), f"{label}: <mimic>"),
-    )
+    with naming(_label(element)):
+        kind, axis = element.get("type", ""), element.find("axis")
+        check_known(kind, TYPES, f"type: expected one of {quoted(TYPES)}")
+        along = (1.0, 0.0, 0.0) if axis is None else three(_numbers(axis, "xyz", "1 0 0"))
+        if not any(along) and kind in WITH_AXIS:
+            raise InputError("<axis>: expected a direction", "0 0 0")
+        return UrdfJoint(
+            name=_name(element),
+            type=kind,
+            parent=_end(element, "parent"),
+            child=_end(element, "child"),
+            origin=_origin(element),
+            axis=along,
+            limits=_attributes(element, "limit"),
+            dynamics=_attributes(element, "dynamics"),
+            mimic=_mimic(element.find("mimic")),
+        )
 
 
-def _end(joint: Element, kind: str, label: str) -> str:
+def _end(joint: Element, kind: str) -> str:
     end = joint.find(kind)
     if end is None or not (name := end.get("link", "")):
-        raise InputError(f'{label}: expected <{kind} link="…"/>', "none")
+        raise InputError(f'expected <{kind} link="…"/>', "none")
     return name
 
 
-def _mimic(element: Element | None, label: str) -> Mimic | None:
+def _mimic(element: Element | None) -> Mimic | None:
     if element is None:
         return None
-    name = _text(element, "joint", label)
-    return Mimic(name, _number(element, "multiplier", label, "1"), _number(element, "offset", label, "0"))
+    return Mimic(_text(element, "joint"), _number(element, "multiplier", "1"), _number(element, "offset", "0"))
 
 
-def _attributes(joint: Element, tag: str, label: str) -> dict[str, float]:
+def _attributes(joint: Element, tag: str) -> dict[str, float]:
     element = joint.find(tag)
     if element is None:
         return {}
-    return {key: _number(element, key, f"{label}: <{tag}>") for key in element.attrib if key in READ[tag]}
+    return {key: _number(element, key) for key in element.attrib if key in READ[tag]}
 
 
-def _origin(element: Element, label: str) -> Origin:
+def _origin(element: Element) -> Origin:
     origin = element.find("origin")
     if origin is None:
         return Origin()
-    where = f"{label}: <origin>"
-    xyz = three(_numbers(origin, "xyz", where))
+    xyz = three(_numbers(origin, "xyz"))
     if origin.get("quat_xyzw") is None:
-        return Origin(xyz, three(_numbers(origin, "rpy", where)))
+        return Origin(xyz, three(_numbers(origin, "rpy")))
     if origin.get("rpy") is not None:  # URDF 1.1 has it or a quaternion, scalar last
-        raise InputError(f"{where}: expected rpy or quat_xyzw", "both")
-    *vector, scalar = _numbers(origin, "quat_xyzw", where, "0 0 0 1")
+        raise InputError("<origin>: expected rpy or quat_xyzw", "both")
+    *vector, scalar = _numbers(origin, "quat_xyzw", "0 0 0 1")
     e = np.array([scalar, *vector])
     size = float(np.linalg.norm(e))
     if abs(size - 1.0) > 0.1:  # less is few digits
-        raise InputError(f"{where}: quat_xyzw: expected a quaternion of length 1", f"length {size:g}")
+        raise InputError("<origin>: quat_xyzw: expected a quaternion of length 1", f"length {size:g}")
     return Origin(xyz, three(rpy_of(of_quaternion(e / size))))
 
 
-def _number(element: Element, key: str, label: str, default: str = "") -> float:
-    return _finite(_text(element, key, label, default), f"{label}: {key}")
+def _number(element: Element, key: str, default: str = "") -> float:
+    return _finite(_text(element, key, default), element, key)
 
 
-def _numbers(element: Element, key: str, label: str, default: str = "0 0 0") -> list[float]:
+def _numbers(element: Element, key: str, default: str = "0 0 0") -> list[float]:
     """As many as `default` has, which stands for a missing attribute."""
     text, count = element.get(key, default), len(default.split())
     if len(parts := text.split()) != count:
-        raise InputError(f"{label}: {key}: expected {count} numbers", f'"{shown(text)}"')
-    return [_finite(part, f"{label}: {key}") for part in parts]
+        raise InputError(f"<{element.tag}>: {key}: expected {count} numbers", f'"{shown(text)}"')
+    return [_finite(part, element, key) for part in parts]
 
 
-def _finite(text: str, label: str) -> float:
+def _finite(text: str, element: Element, key: str) -> float:
     try:
         value = float(text)
     except ValueError:
         value = math.nan
     if not abs(value) <= LARGEST:  # False of NaN
-        raise InputError(f"{label}: expected a finite number up to {LARGEST:g}", f'"{shown(text)}"')
+        raise InputError(f"<{element.tag}>: {key}: expected a finite number up to {LARGEST:g}", f'"{shown(text)}"')
     return value
 
 
