@@ -78,7 +78,7 @@ def cards(path: Path) -> Iterator[Card]:
             by_mark = ends.get(row.begin)
             before = before if by_mark is None and k and not rows[before].end else -1 if by_mark is None else by_mark
         if before < 0 or before in after:
-            raise InputError(f"{row.place}: expected one card that this line continues", "none or several")
+            raise InputError(f"expected one card (GRID …) that {row.place} continues", "none or several")
         after[before] = k
     for k, row in enumerate(rows):
         if row.is_half and k not in after:
