@@ -142,7 +142,7 @@ class Amplifiers:
         most, least = (h * np.minimum(self.slew, of) for of in left)
         kept = np.clip(np.clip(after, now - least, now + most), *self.range)
         most = np.where(kept > now, most, least)
-        ramp = kept - (kept - now) * np.abs(kept - now) / (2 * most)  # at that rate
+        ramp = kept - (kept - now) * np.abs(kept - now) / (2 * most)
         mean = np.where(np.abs(ramp - now) < np.abs(mean - now), ramp, mean)
         return kept, np.where(kept == after, mean, (now + kept) / 2)
 

@@ -353,12 +353,12 @@ class _Integration:
 
 
 def _with_both_sides(times: Array, states: Array, changes: Array, instant: float) -> tuple[Array, Array, Array]:
-    """Times (k,), s, and states (k, n), with the instants before commands change, at `changes` (m,), s, beside these.
+    """Times (k,), s, and states (k, n), with those before commands change, at `changes` (m,), s, after the start.
 
     And those on both sides of changes, by which means over time are, where they are not too many.
     """
     near = np.clip(np.searchsorted(times, changes - instant), 0, len(times) - 1)
-    near = near[np.abs(times[near] - changes) < instant]
+    near = near[(near > 0) & (np.abs(times[near] - changes) < instant)]
     before = times[near] - 2.0 * instant
     every = np.append(times, before)
     order = np.argsort(every, kind="stable")

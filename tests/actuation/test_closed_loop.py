@@ -51,6 +51,7 @@ def test_commands_stop_at_the_limits_of_the_motors():
     outcomes = solve_scene(wheel(loop(controller=[PID], disturbance=blow()), joint={"moment_limit": 0.5}))
     record = outcomes.outcomes["loop"].details
     assert np.abs(record.commands).max() == 0.5 == record.metrics.peak_moment
+    assert outcomes.outcomes["loop"].closer.time[0] == 0.0  # peaks are none of what would act before
     assert np.abs(record.wanted).max() > 0.6
     cut = (np.abs(record.wanted) > 0.5).any(axis=1).mean()
     assert record.metrics.saturated == cut > 0
