@@ -21,7 +21,6 @@ import pytest
 from forked_commands import LIMIT, READING, Commands
 
 from ffrobot.batch import batch
-from ffrobot.batch.batch import Processes
 from ffrobot.common.cache import cache_folder
 from ffrobot.common.parallel import environment_without_mpi
 from ffrobot.mesh import form_cache, part_reader
@@ -159,33 +158,6 @@ def own_made(folder):
     return folder
 
 
-class KeptProcesses(Processes):
-    """One process stays for the studies of all tests, and with it its worker, which has loaded the finite elements."""
-
-    _kept = None
-
-    def __new__(cls, count):
-        is_kept = count == 1 and cls._kept is not None and not cls._kept._broken
-        return cls._kept if is_kept else super().__new__(cls)
-
-    def __init__(self, count):
-        if self is not KeptProcesses._kept:
-            super().__init__(count)
-            if count == 1:
-                KeptProcesses.end()
-                KeptProcesses._kept = self
-
-    def shutdown(self, wait=True, *, cancel_futures=False):
-        if self is not KeptProcesses._kept:
-            super().shutdown(wait, cancel_futures=cancel_futures)
-
-    @classmethod
-    def end(cls):
-        kept, cls._kept = cls._kept, None
-        if kept is not None:
-            kept.shutdown()
-
-
 @pytest.fixture(scope="session", autouse=True)
 def own_cache(shared_folder):
     """Nothing that tests compute goes to the user's cache or comes from there; returns the cache of the test run.
@@ -199,9 +171,7 @@ def own_cache(shared_folder):
         forms = cache_folder("forms")
         patch.setattr(form_cache, "cache_folder", lambda _, name: own_made(forms / name))
         patch.setattr(batch, "processors", lambda: 1)  # tests go side by side already
-        patch.setattr(batch, "Processes", KeptProcesses)
         yield cache
-        KeptProcesses.end()
 
 
 @pytest.fixture(scope="session")

@@ -15,7 +15,7 @@ import tomli_w
 from beam_links import beam_link, tube
 
 import ffrobot as library
-from ffrobot.batch.batch import Processes, _done, batch_of
+from ffrobot.batch.batch import Batch, Processes, _done, batch_of
 from ffrobot.batch.worker import own_worker
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.common.version import VERSION
@@ -112,7 +112,7 @@ def test_killed_processes_are_replaced(tmp_path):
 
 
 def test_processes_end_with_their_batch():
-    with batch_of(2) as batch:
+    with Batch(lambda: Processes(2)) as batch:
         processes = {pid for _, pid in batch.results(_pid, range(8))}
     for pid in processes:
         with pytest.raises(ProcessLookupError):
