@@ -6,12 +6,8 @@ its end, `peak`, the most so far, and `grown`, by how much that is more than bef
 
 import ctypes
 import gc
-import os
 import resource
-from contextlib import suppress
 from functools import cache
-from multiprocessing import active_children
-from pathlib import Path
 
 import pytest
 from forked_commands import Commands
@@ -67,19 +63,9 @@ def least_memory():
 
 
 def processor_time():
-    """Seconds of this process, of processes that it started, and of all commands."""
+    """Seconds of this process, of processes that it started and that have ended, and of all commands."""
     used = [resource.getrusage(of) for of in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    ended = sum(one.ru_utime + one.ru_stime for one in used)
-    return ended + sum(seconds_of_family(process.pid) for process in active_children()) + Commands.seconds
-
-
-def seconds_of_family(pid):
-    """Of processors, of a process that has not ended and of all that it started: that of studies, which stays."""
-    with suppress(OSError):
-        ticks = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11:15]
-        children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
-        return sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK") + sum(map(seconds_of_family, children))
-    return 0.0
+    return sum(one.ru_utime + one.ru_stime for one in used) + Commands.seconds
 
 
 def peak():
