@@ -28,10 +28,12 @@ check "clang-format" .venv/bin/clang-format --dry-run --Werror "${cpp[@]}"
 export GLIBC_TUNABLES=glibc.malloc.hugetlb=1
 
 status=0
-# A process for each core, and one more, as commands and browsers wait; a file's tests share one, and what it sets up.
+# A process for each core (nproc would return OMP_NUM_THREADS), at most four, as each and what it starts take up to
+# 2 GB; a file's tests share one, and what it sets up.
 # -n 0 among the arguments: one after the other.
 # build/tests.xml keeps what each test took.
-.venv/bin/python -m pytest -n "$(($(nproc) + 1))" --dist loadfile --junitxml build/tests.xml "$@" || status=$?
+cores=$(env -u OMP_NUM_THREADS nproc)
+.venv/bin/python -m pytest -n "$((cores < 4 ? cores : 4))" --dist loadfile --junitxml build/tests.xml "$@" || status=$?
 .venv/bin/python scripts/test_costs.py build/tests.xml
 check "mypy" wait "$mypy"
 cat build/types.txt
