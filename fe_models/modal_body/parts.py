@@ -16,14 +16,23 @@ LEVI_CIVITA = np.array([[[(a - b) * (b - c) * (c - a) / 2 for c in range(3)] for
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Integrals:
-    """Inertia shape integrals of a link over its volume, in its axes (docs/theory.md; Shabana, ch. 5); n modes."""
+    """Inertia shape integrals of a link over its volume, in its axes (docs/theory.md; Shabana, ch. 5); n modes.
 
-    mass: float  # m in kg
-    first_moment: Array  # (3,) ∫ρ x dV in kg·m
-    second_moment: Array  # (3, 3) ∫ρ x xᵀ dV in kg·m²
-    S_bar: Array  # (3, n) ∫ρ Φ dV in √kg
-    I_bar: Array  # (3, 3, n) ∫ρ x_k Φ_l dV at [k, l] in m·√kg
-    S_bar_kl: Array  # (3, 3, n, n) ∫ρ Φ_kᵀ Φ_l dV at [k, l]
+    Attributes:
+        mass: m in kg.
+        first_moment: (3,) ∫ρ x dV in kg·m.
+        second_moment: (3, 3) ∫ρ x xᵀ dV in kg·m².
+        S_bar: (3, n) ∫ρ Φ dV in √kg.
+        I_bar: (3, 3, n) ∫ρ x_k Φ_l dV at [k, l] in m·√kg.
+        S_bar_kl: (3, 3, n, n) ∫ρ Φ_kᵀ Φ_l dV at [k, l].
+    """
+
+    mass: float
+    first_moment: Array
+    second_moment: Array
+    S_bar: Array
+    I_bar: Array
+    S_bar_kl: Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

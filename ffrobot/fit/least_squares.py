@@ -29,16 +29,22 @@ Frequencies = Callable[[Array], Array]
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(ABC):
-    """The n fitted parameters."""
+    """The n fitted parameters.
 
-    keys: tuple[str, ...]  # names of the parameters
-    # (n,) before and after the fit, in the units of the keys
+    Attributes:
+        keys: names of the parameters.
+        start, value: (n,) before and after the fit, in the units of the keys.
+        relative_deviation: (n,) standard deviations of the parameters, relative to them; NaN where not known.
+        correlation: (n, n) of the parameters' errors, no unit; NaN where not known.
+        files: the files written.
+    """
+
+    keys: tuple[str, ...]
     start: Array
     value: Array
-    # (n,) standard deviations of the parameters, relative to them; NaN where not known
     relative_deviation: Array
-    correlation: Array  # (n, n) of the parameters' errors, no unit; NaN where not known
-    files: tuple[str, ...] = ()  # the files written
+    correlation: Array
+    files: tuple[str, ...] = ()
 
     @property
     def deviation(self) -> Array:
