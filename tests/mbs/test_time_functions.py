@@ -231,7 +231,7 @@ def test_stairs_of_many_holds(tmp_path):
     [
         ("", "header"),
         ("x,y\n0,0\n1,1\n", "header"),
-        ("t,x,x\n0,0,0\n1,1,1\n", "header"),
+        ("t,x,x\n0,0,0\n1,1,1\n", "line 1: expected each column once"),
         ("t,x\n0,0\n", "at least 2"),
         ("t,x\n0,0\n1,one\n", "line 3: expected 2 numbers"),
         ("t,x\n0,0\n1,nan\n", "line 3"),
