@@ -51,7 +51,8 @@ class Browser:
 
     def open(self, path, *, playing=False):
         """Load a page and wait until the mechanism moves; stop it, so that all else is drawn faster."""
-        self.driver.get_log("browser")  # of the page before
+        self.driver.get("about:blank")  # ends the page before, of which charts may be half drawn
+        self.driver.get_log("browser")
         self.driver.get(path.as_uri())
         self.wait("state.playing", 60)
         if not playing:
