@@ -299,7 +299,7 @@ def stiffness_of(system: MultibodySystem, at: State) -> Stiffness:
     share = np.abs(shapes[:, k])
     joint = max(model.tree.nodes, key=lambda node: share[node.v].max(initial=0.0)).joint
     square, damping = (float(np.linalg.eigvals(by_forces @ of).real.max()) for of in (K, D))
-    return Stiffness(float(rates[k].real), joint.label, square**0.5, damping)
+    return Stiffness(float(rates[k].real), joint.label, max(square, 0.0) ** 0.5, damping)
 
 
 def _sticks(model: Model) -> bool:
