@@ -23,7 +23,6 @@ import numpy as np
 import trimesh
 from forked_command import BAD, load_once, outcome, run
 from hostile import Damage
-from kills import LINK
 from record import options, record
 
 from ffrobot.common.checksum import seal
@@ -38,6 +37,14 @@ ODD = (
     "", " ", "/", "..", "../../out", "/tmp/ffrobot_out", "a\nb", "a" * 300, "é関", "\u202e", "\0", "<script>", "%s%n",
 )  # fmt: skip
 TEXTS = (*NUMBERS, *RUN, *ODD)
+LINK = """
+name = "arm"
+material = { youngs_modulus = 70e9, poissons_ratio = 0.33, density = 2700.0 }
+geometry = { kind = "beam", length = 0.6, section = { shape = "tube", outer = 0.02, inner = 0.016 } }
+mesh = { elements = 10 }
+reference = { condition = "cantilever" }
+modes = { count = 3, family = "in-plane-bending" }
+"""
 SCENE = """
 name = "arm"
 gravity = [0.0, -9.81]

@@ -2,7 +2,7 @@
 
 A campaign (a script in this folder, run by hand with seeds of its own) takes an option `--record` and ends with
 
-    record("kills", tried="100 signals at random times …", found="0 half-written files, …")
+    record("meshes", tried="231 single changes of a bar …", found="0 × traceback, …")
 
 Counts belong into both texts. The table of the page then takes it in with `python tests/campaigns/table.py`, which
 reads all files in `records/`; both are committed. A campaign of several parts has a name for each: "tolerance-radau".
