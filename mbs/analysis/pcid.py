@@ -3,7 +3,6 @@
 from typing import Literal
 
 from ..linear.statics import hanging_joints, initial_state
-from ..posture.start import displaced_joints
 from ..run.context import Context
 from ..run.drive import drive_robot
 from ..run.record import Run
@@ -32,9 +31,7 @@ class Pcid(IntegratedAnalysis):
         """
         path = context.path
         assert path is not None
-        model, start = path.model, initial_state(path.model, path.state)
-        gears = {gear.joint.joint.name for gear in model.tree.gears}
-        warnings = (*path.warnings, *displaced_joints(model, path.state, gears))
+        model, start, warnings = path.model, initial_state(path.model, path.state), path.warnings
         if path.mobility.followed < path.mobility.freedom:
             warnings += tuple(hanging_joints(model, path.state, start))
         return drive_robot(

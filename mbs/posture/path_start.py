@@ -7,7 +7,7 @@ from ..model.model import Model
 from .posture import Mobility, check_path, mobility
 from .reach import check_reach
 from .redundancy import resolved
-from .start import undeformed_posture
+from .start import displaced_joints, undeformed_posture
 
 
 @struct
@@ -31,4 +31,7 @@ def path_start(model: Model, end: float) -> PathStart:
     state = undeformed_posture(rigid)
     warnings, free = tuple(check_path(rigid, state.q, end)), mobility(rigid, state.q)
     geared = with_prescribed_motors(rigid)
-    return PathStart(geared, state if geared is rigid else undeformed_posture(geared), free, warnings)
+    if geared is not rigid:
+        state = undeformed_posture(geared)
+        warnings += tuple(displaced_joints(geared, state, {gear.joint.joint.name for gear in geared.tree.gears}))
+    return PathStart(geared, state, free, warnings)
