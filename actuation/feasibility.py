@@ -14,7 +14,7 @@ from ..common.structs import struct
 from ..fe_models.modal_body import ModalBody
 from ..mbs.model.body import Body
 from ..mbs.model.known_motion import mass_matrices
-from ..mbs.model.system import split_forces
+from ..mbs.model.system import MultibodySystem, split_forces
 from ..mbs.quantities.motion import modal_coordinates, node_of, point_names
 from ..mbs.quantities.supply import actuator_forces, motors_fit
 from ..mbs.run.record import Run
@@ -93,7 +93,7 @@ def freed_shift(run: Run, modal: Mapping[str, Array], point: str, rows: Indices)
     """
     # δq = δq_locked − R γ with Rᵀ M δq = 0
     shift, R = _locked(run, modal, rows)
-    MR = mass_matrices(run.model, run.q[rows]) @ R
+    MR = mass_matrices(MultibodySystem(run.model), run.q[rows]) @ R
     gamma = np.linalg.solve(np.swapaxes(R, 1, 2) @ MR, np.einsum("tki,tk->ti", MR, shift)[:, :, None])
     tree, freed = run.model.tree, shift - (R @ gamma)[:, :, 0]
     return tree.places(run.q[rows], freed).at(tree.section(point)).velocity

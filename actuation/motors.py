@@ -14,6 +14,7 @@ from ..mbs.joints.joint import MotorLimits
 from ..mbs.linear.statics import Statics
 from ..mbs.model.known_motion import mass_matrices
 from ..mbs.model.nodes import rotor
+from ..mbs.model.system import MultibodySystem
 from ..mbs.quantities.motion import joint_motion
 from ..mbs.quantities.supply import actuator_forces, motor_motion
 from ..mbs.run.record import Run
@@ -124,7 +125,7 @@ def _load_inertias(run: Run) -> dict[str, tuple[float, ...]]:
     if model.loop_rows.any() or not len(run.time):
         return {}
     rows = np.unique(np.linspace(0, len(run.time) - 1, 50).astype(int))
-    inertia = mass_matrices(model, run.q[rows])
+    inertia = mass_matrices(MultibodySystem(model), run.q[rows])
     most = inertia.diagonal(axis1=1, axis2=2).max(axis=0)
     inertias, behind = {}, {gear.joint.joint.name: gear.joint.v for gear in model.tree.gears}
     for joint, columns in model.motors.items():

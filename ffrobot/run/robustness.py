@@ -22,6 +22,7 @@ from ..mbs.model.build import build_model
 from ..mbs.model.gears import elastic_joints, with_compliance
 from ..mbs.model.known_motion import State, mass_matrices
 from ..mbs.model.model import Model
+from ..mbs.model.system import MultibodySystem
 from ..mbs.posture.prescribed import following_motors
 from ..mbs.run.context import place_of
 from ..mbs.run.gears import with_motor_coordinates
@@ -135,7 +136,7 @@ class _Runs:
         rigid = ControlledRobot(model.without_paths(), self.context.patches, self.source).rigid().mobility()
         mobility = model.by_motor(rigid)
         geared, start = self._geared(model)
-        giving = np.diag(np.linalg.inv(mass_matrices(geared, start.q[None])[0]))[geared.motor_columns]
+        giving = np.diag(np.linalg.inv(mass_matrices(MultibodySystem(geared), start.q[None])[0]))[geared.motor_columns]
         squares = [float(node.body.stiffness.min()) for node in model.tree.nodes if node.body.n_modes]
         squares += [min(gear.spring.slopes) * mobility[gear.joint.joint.name].max() for gear in geared.tree.gears]
         slow_enough = SAMPLED * float((rigid / giving).min())

@@ -91,7 +91,7 @@ class LinearEquations:
         tree, s = self.model.tree, self.independent
         state = KnownStates(q[None], v[None], a[None])
         H, determine = self._followers(state, t)
-        force = H.T @ required_forces(self.model, state, np.array([t]))[0]
+        force = H.T @ required_forces(self.system, state, np.array([t]))[0]
         along_s = np.zeros(tree.n_v)
         along_s[s] = force
         core, N = self.system.core.derivatives(self.system.scene, t, q, v, along_s), np.zeros_like(H)

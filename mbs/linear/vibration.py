@@ -13,6 +13,7 @@ from ...common.structs import struct
 from ..model.gears import friction_damping, gear_matrices, with_prescribed_motors
 from ..model.known_motion import State, mass_matrices
 from ..model.model import Model
+from ..model.system import MultibodySystem
 from ..posture.redundancy import resolved
 from ..posture.start import relaxed_gears, undeformed_posture
 
@@ -32,14 +33,14 @@ class Vibrations(NamedTuple):
     springs: Array
 
 
-def vibrations_of(model: Model, t: float, q: Array) -> Vibrations:
-    """Vibrations about q (n_q,), rad and m, under the constraint equations of `model` at time t, s.
+def vibrations_of(system: MultibodySystem, t: float, q: Array) -> Vibrations:
+    """Vibrations about q (n_q,), rad and m, under the constraint equations at time t, s.
 
     K are the stiffnesses of links and gears, D their damping and viscous friction; neither gravity nor dry friction.
     """
-    sizes = model.natural_sizes
+    model, sizes = system.model, system.model.natural_sizes
     both = np.outer(sizes, sizes)
-    M = mass_matrices(model, q[None], t)[0] * both
+    M = mass_matrices(system, q[None], t)[0] * both
     (C_v,) = model.constraints.natural_gradients(q[None], np.array([t]), sizes)
     K, D = gear_matrices(model.tree, q)
     D += friction_damping(model, q)
@@ -84,7 +85,7 @@ def frequencies_along(model: Model, begin: float, end: float, modes: int) -> Pat
     Raises `InputError` where the path is out of reach, or there are fewer vibrations.
     """
     model = with_prescribed_motors(resolved(model, end))
-    state, spectra = undeformed_posture(model), []
+    state, system, spectra = undeformed_posture(model), MultibodySystem(model), []
     for t in np.linspace(begin, end, INSTANTS):
         q = model.constraints.posture(state.q, float(t))
         if q is None:
@@ -94,7 +95,7 @@ def frequencies_along(model: Model, begin: float, end: float, modes: int) -> Pat
                 f" {quoted(dict.fromkeys(row.owner for row in model.rows))}",
             )
         state = relaxed_gears(model, State(q, np.zeros_like(state.v)))
-        spectra.append(vibrations_of(model, float(t), state.q)[:2])
+        spectra.append(vibrations_of(system, float(t), state.q)[:2])
     most = min(len(omega) for omega, _ in spectra)
     if most < modes:
         raise InputError(
@@ -114,7 +115,7 @@ def with_robot_damping(model: Model, ratios: Mapping[str, float]) -> Model:
     if not ratios:
         return model
     start, tree = undeformed_posture(model), model.tree
-    modes = vibrations_of(model.without_paths(), 0.0, start.q)
+    modes = vibrations_of(MultibodySystem(model.without_paths()), 0.0, start.q)
     # D (modes of all bodies)² with ΦᵀDΦ = diag(2ω), ζ = 1, of which each body has its block on the diagonal; rigid
     # motion is free of it, and so is motion of p that the joints do not allow
     inverse, bodies = np.linalg.pinv(modes.shape[~tree.joint_columns]), [node.body for node in tree.nodes]

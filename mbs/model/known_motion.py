@@ -10,7 +10,6 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.structs import struct
 from .. import _core
-from .model import Model
 from .nodes import Section, rotor
 from .system import MultibodySystem
 
@@ -143,10 +142,10 @@ def multiplier_forces(system: MultibodySystem, q: Array, times: Array, multiplie
     return MotionForces(system, forces)
 
 
-def rotor_torques(model: Model, states: States, times: Array) -> Array:
+def rotor_torques(system: MultibodySystem, states: States, times: Array) -> Array:
     """Return J u̇ (T, bodies), N·m, of the rotor in each body's inboard joint, u its speed, else 0; `times` (T,), s."""
-    tree, system = model.tree, MultibodySystem(model)
-    forces = motion_forces(system, states, times, np.zeros((len(times), len(model.rows))))
+    tree = system.model.tree
+    forces = motion_forces(system, states, times, np.zeros((len(times), len(system.model.rows))))
     places, torque = tree.places(states.q), np.zeros((len(times), len(tree.nodes)))
     for number, node in enumerate(tree.nodes):
         if node.joint.type == "revolute":
@@ -158,9 +157,8 @@ def rotor_torques(model: Model, states: States, times: Array) -> Array:
     return torque
 
 
-def required_forces(model: Model, state: States, times: Array) -> Array:
-    """Return M v̇ − Q (T, n_v), N, N·m, N/√kg, at `times` (T,), s; Q: gravity, elasticity, friction, scene's loads."""
-    system = MultibodySystem(model)
+def required_forces(system: MultibodySystem, state: States, times: Array) -> Array:
+    """Return M v̇ − Q (T, n_v), N, N·m, N/√kg, at `times` (T,), s; Q: gravity, elasticity, friction, given loads."""
     return system.core.required_forces(system.scene, times.tolist(), state.q, state.v, state.a)
 
 
@@ -170,10 +168,10 @@ def row_accelerations(system: MultibodySystem, state: States, times: Array) -> A
     return of_core * system.model.row_signs
 
 
-def mass_matrices(model: Model, q: Array, t: float = 0.0) -> Array:
+def mass_matrices(system: MultibodySystem, q: Array, t: float = 0.0) -> Array:
     """Return mass matrices (T, n_v, n_v), kg, kg·m², 1 of modes, at q (T, n_q), by forces of unit accelerations."""
-    T, n = len(q), model.tree.n_v
-    system, a = MultibodySystem(model), np.tile(np.vstack([np.zeros(n), np.eye(n)]), (T, 1))
+    T, n = len(q), system.model.tree.n_v
+    a = np.tile(np.vstack([np.zeros(n), np.eye(n)]), (T, 1))
     states = np.repeat(q, n + 1, axis=0), np.zeros((T * (n + 1), n)), a
     f = system.core.required_forces(system.scene, [t] * len(a), *states).reshape(T, n + 1, n)
     return np.swapaxes(f[:, 1:] - f[:, :1], 1, 2)

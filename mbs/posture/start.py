@@ -12,6 +12,7 @@ from ...common.toml_files import toml_line
 from ..model.known_motion import State, mass_matrices
 from ..model.model import MET, Model
 from ..model.nodes import Node
+from ..model.system import MultibodySystem
 from ..scene.bodies import ROUND_OFF, tensor
 from ..scene.mechanism import MechanismKeys
 from .posture import singular_ratios
@@ -95,7 +96,7 @@ def check_turning(model: Model) -> None:
     if not slim:
         return
     natural = model.natural_sizes
-    M = mass_matrices(model, undeformed_posture(model).q[None])[0] * np.outer(natural, natural)
+    M = mass_matrices(MultibodySystem(model), undeformed_posture(model).q[None])[0] * np.outer(natural, natural)
     sizes, least = np.diag(M), LEAST * np.abs(np.trace(M))
     for node in model.tree.nodes:
         if (sizes[node.v] <= least).any():

@@ -17,6 +17,7 @@ from ..linear.vibration import elastic_shapes
 from ..model.body import Body, bent_section
 from ..model.known_motion import mass_matrices
 from ..model.nodes import Node
+from ..model.system import MultibodySystem
 from ..run.record import Run
 from .motion import constraint_rows, node_of, section_motion
 
@@ -111,7 +112,7 @@ def start_of_motion(run: Run) -> Start:
         energy += _deformation(run, node) ** 2 @ node.body.stiffness
         if node.body.attachment_modes and node.body.n_eigenmodes:
             late[node.p_v] = _late(node.body)
-    (M,), sizes = mass_matrices(run.model, run.q[:1], float(run.time[0])), run.model.natural_sizes
+    (M,), sizes = mass_matrices(MultibodySystem(run.model), run.q[:1], float(run.time[0])), run.model.natural_sizes
     both = np.outer(sizes, sizes)
     return Start(
         M=M * both,

@@ -15,7 +15,7 @@ from ..fields.field_types import split_point
 from ..model.known_motion import MotionForces, Wrench, motion_forces, required_forces
 from ..model.masses import turns_as_a_body
 from ..model.nodes import Section
-from ..model.system import split_forces
+from ..model.system import MultibodySystem, split_forces
 from ..run.record import Run
 from ..scene.bodies import tensor
 from .motion import acting_forces, places, system_of
@@ -40,8 +40,8 @@ def loads_on_links(run: Run, bodies: Iterable[str]) -> dict[str, LinkLoads]:
     if not run.is_prescribed or model.loop_rows.sum() + len(model.motor_columns) != int(model.tree.joint_columns.sum()):
         return _link_loads(run, bodies, acting_forces(behind))
     # Motors carry the motion, in place of forces on its paths
-    multipliers = np.zeros_like(run.multipliers)
-    multipliers[:, model.loop_rows] = split_forces(model, run.q, required_forces(model, run, run.time)).loops
+    multipliers, wanted = np.zeros_like(run.multipliers), required_forces(MultibodySystem(model), run, run.time)
+    multipliers[:, model.loop_rows] = split_forces(model, run.q, wanted).loops
     return _link_loads(run, bodies, motion_forces(system_of(behind), behind, run.time, multipliers))
 
 

@@ -93,7 +93,7 @@ def _lowest_frequency(model: Model, q: Array, t: float) -> float:
     if not free.shape[1]:
         return float("nan")
     ways = statics.sizes[:, None] * free
-    K, M = free.T @ statics.stiffness(q, at) @ free, ways.T @ mass_matrices(model, q[None], t)[0] @ ways
+    K, M = free.T @ statics.stiffness(q, at) @ free, ways.T @ mass_matrices(statics.system, q[None], t)[0] @ ways
     K, M, own = (K + K.T) / 2, (M + M.T) / 2, np.abs(K.diagonal())
     scale = 1.0 / np.sqrt(np.maximum(own, FLOOR * max(own.max(), np.finfo(float).tiny)))
     if np.linalg.eigvalsh(scale[:, None] * K * scale)[0] < FREE:

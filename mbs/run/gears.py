@@ -21,7 +21,7 @@ from ..model.gears import with_compliance
 from ..model.known_motion import KnownStates, States, required_forces, rotor_torques
 from ..model.model import Model
 from ..model.nodes import Node, rotor
-from ..model.system import MotorForces, motor_forces, path_forces, turning_motors
+from ..model.system import MotorForces, MultibodySystem, motor_forces, path_forces, turning_motors
 from .record import GearCurve, GearMotion, Run
 
 if TYPE_CHECKING:
@@ -65,13 +65,14 @@ def supplied_through_gears(run: Run) -> Supplied:
                 f"{model.scene.path}: expected no [[load]] on joints with stiffness in inverse analyses and equilibria",
                 f'one on "{load.joint}"',
             )
-    felt, torques, known = np.zeros_like(wanted), rotor_torques(model, run, time), []
+    felt, torques, known = np.zeros_like(wanted), rotor_torques(MultibodySystem(model), run, time), []
     for gear in elastic:
         joint, (inertia, N) = gear.joint.joint.name, rotor(gear.motor)
         where = f'{model.scene.path}: joint "{joint}"'
         spring = GearSpring(gear.spring, gear.damping, inertia * N**2, where)
         known.append((joint, spring, N * torques[:, model.tree.index[gear.joint.body.name]], _along(gear.joint, run)))
-    rigid = required_forces(compliant, with_motors(compliant, run, {}), time)
+    system = MultibodySystem(compliant)
+    rigid = required_forces(system, with_motors(compliant, run, {}), time)
     is_found, change = bool(twists) and all(of.torque is not None for of in twists.values()), np.inf
     for passes in count(1):
         forces = motor_forces(model, run.q, wanted + felt)
@@ -81,7 +82,7 @@ def supplied_through_gears(run: Run) -> Supplied:
         }
         if is_found:
             break
-        needed = required_forces(compliant, with_motors(compliant, run, gears), time) - rigid
+        needed = required_forces(system, with_motors(compliant, run, gears), time) - rigid
         before, felt = felt, needed[:, : felt.shape[1]]
         for gear in elastic:  # but for what their springs do along their own joints
             of = gears[gear.joint.joint.name].twist

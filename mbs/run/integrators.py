@@ -252,7 +252,7 @@ def choose_integrator(
     choice = None if model.tree.gears else without_choosing(_of_links(model), float(np.ptp(times)), replay, cost)
     if choice is not None:
         return choice if replayed is None else choice._replace(candidates=())
-    vibrations = vibrations_of(model, 0.0, start.q)
+    vibrations = vibrations_of(system, 0.0, start.q)
     if not len(vibrations.frequency):
         return Choice("dop853", "nothing vibrates")
     excited = _excitation(system, start, vibrations)

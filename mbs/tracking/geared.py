@@ -18,7 +18,7 @@ from ..model.gears import compliance, elastic_joints
 from ..model.known_motion import rotor_torques
 from ..model.model import Model
 from ..model.nodes import rotor
-from ..model.system import turning_motors
+from ..model.system import MultibodySystem, turning_motors
 
 SAMPLES = 5  # along the path, at which the torque of a gear is found in two ways
 TINY = 1e-300
@@ -146,7 +146,7 @@ def _check_rotors(servo: GearedServo, ratios: Array) -> None:
     times = servo.end * np.linspace(0.0, 1.0, SAMPLES + 2)[1:-1]
     still = np.zeros((SAMPLES, len(servo.scale)))
     states = servo.motion.motion(times.tolist(), still, still, still, servo.postures(times))
-    spin_up = rotor_torques(model, states, times)
+    spin_up = rotor_torques(MultibodySystem(model), states, times)
     torques = servo.forces(times, still, still, still)[1]
     for k, joint in enumerate(gears.joints):
         tau, tau_s = torques[:, gears.columns[k]], torques[:, k - len(gears.joints)]

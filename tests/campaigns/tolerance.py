@@ -23,6 +23,7 @@ from robots_3d import random_scene_in_3d
 import ffrobot
 from ffrobot.common.errors import FfrobotError
 from ffrobot.mbs.linear.vibration import vibrations_of
+from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.posture.start import undeformed_posture
 from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
@@ -56,7 +57,7 @@ def planar_scene(seed, number, analyses):
     """Its kind and scene, with an end before the highest vibration has gone through `MOST_RADIANS`."""
     kind, scene = random_scene(seed, number)
     model, (analysis,) = prepare_scene(scene, Watcher()).model, scene.analysis
-    top = float(vibrations_of(model, 0.0, undeformed_posture(model).q).frequency[-1])
+    top = float(vibrations_of(MultibodySystem(model), 0.0, undeformed_posture(model).q).frequency[-1])
     shorter = min(1.0, MOST_RADIANS / (top * analysis.end))
     times = {"end": shorter * analysis.end, "output_step": shorter * analysis.output_step, "max_steps": MOST_STEPS}
     copies = [times | {"name": name, "tolerance": at, "integrator": by} for name, at, by in analyses]

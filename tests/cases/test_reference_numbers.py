@@ -8,6 +8,7 @@ from tables_3d import ORIGIN, Y, joint, revolute, rigid, scene
 import ffrobot
 from ffrobot.mbs.model.build import build_model
 from ffrobot.mbs.model.known_motion import KnownStates, required_forces
+from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.run.bodies import load_bodies
 
 ALL_BENDING = ["in-plane-bending", "out-of-plane-bending"]
@@ -97,7 +98,7 @@ def whirling(model, Omega):
         v[:, node.v] = [0.0, 0.0, 0.0, Omega, 0.0, 0.0]
         (q[:, node.p_q], v[:, node.p_v], a[:, node.p_v])[k][:] = h * np.eye(n)
         state = KnownStates(q, v, a)
-        return required_forces(model, state, np.zeros(n))[:, node.p_v].T
+        return required_forces(MultibodySystem(model), state, np.zeros(n))[:, node.p_v].T
 
     K, D, M = ((forces(k, h) - forces(k, -h)) / (2 * h) for k, h in enumerate((1e-3, 1.0, 1.0)))
     A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, D)]])
@@ -158,7 +159,7 @@ def test_rod_that_spins_is_stretched():
     q[1:, node.p_q] = step * np.eye(n)
     a[:, node.v] = 0.0
     state = KnownStates(q, v, a)
-    forces = required_forces(model, state, np.zeros(n + 1))[:, node.p_v]
+    forces = required_forces(MultibodySystem(model), state, np.zeros(n + 1))[:, node.p_v]
     K = (forces[1:] - forces[0]).T / step  # forces on modes are affine in p
     p = np.linalg.solve(K, -forces[0])
     alpha = Omega * np.sqrt(density / E)

@@ -68,7 +68,7 @@ def test_accelerations_moments_and_mass_matrices(robot, pinocchio_dynamics):
 
     close([accelerations(q, v, tau) for q, v, _, tau in zip(*motion, strict=True)], expected["aba"])
     moving = KnownStates(motion.q, motion.v, motion.a)
-    close(required_forces(system.model, moving, np.zeros(STATES)), expected["rnea"])
+    close(required_forces(system, moving, np.zeros(STATES)), expected["rnea"])
     for q, v, M in zip(motion.q, motion.v, expected["crba"], strict=True):
         free = accelerations(q, v, np.zeros(tree.n_v))
         inverse = np.array([accelerations(q, v, unit) - free for unit in np.eye(tree.n_v)])

@@ -13,6 +13,7 @@ from scipy.linalg import eigh, null_space
 import ffrobot
 from ffrobot.mbs.inversion.motors_only import MotorsOnly
 from ffrobot.mbs.linear.vibration import vibrations_of
+from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.posture.start import undeformed_posture
 from ffrobot.mbs.quantities.motion import constraint_rows
 
@@ -29,7 +30,7 @@ def test_vibrations_solve_the_linearised_equations():
     """Frequencies and shapes by the oracle's mass matrix, and by what the constraints leave free."""
     robot = arm()
     q = undeformed_posture(robot.model).q
-    modes = vibrations_of(robot.model, 0.0, q)
+    modes = vibrations_of(MultibodySystem(robot.model), 0.0, q)
     motion = evaluated(robot, 0.0, q, 0 * q).motion
     mechanism, K = mechanism_of(robot.model.tree, np.zeros(3)), np.zeros((len(q), len(q)))
     (state,) = absolute_states(mechanism, accelerated(motion))

@@ -51,7 +51,7 @@ def test_generalized_forces_are_the_virtual_work_of_the_frames(turned):
     node = model.tree.nodes[1]
     axis = tree_oracle.motion(model.tree, node.inner, state.q, state.frames).F[0, :, 2]
     expected = MOMENT * axis @ (state.frames[1].L[0, 3:] - state.frames[node.inner.body].L[0, 3:])
-    (found,) = required_forces(model, state, np.array([0.1]))
+    (found,) = required_forces(MultibodySystem(model), state, np.array([0.1]))
     np.testing.assert_allclose(found, expected, atol=1e-9 * MOMENT)
     modal = ~model.tree.joint_columns
     assert np.abs(expected[modal]).max() > 1e-3 * MOMENT

@@ -17,6 +17,7 @@ from ffrobot.mbs.inversion.servo import make_servo
 from ffrobot.mbs.inversion.zero_dynamics import equilibrium, linearise
 from ffrobot.mbs.model.gears import with_compliance
 from ffrobot.mbs.model.known_motion import required_forces
+from ffrobot.mbs.model.system import MultibodySystem
 from ffrobot.mbs.quantities.supply import motor_moments
 from ffrobot.mbs.run.gears import with_motor_coordinates
 from ffrobot.mbs.tracking.advice import singular_times
@@ -190,7 +191,7 @@ def test_twisting_rotors_push_the_links_that_carry_them():
         assert np.ptp(of.twist(around_end, 1)) < 1e-6 * np.abs(of.twist(along, 1)).max()
     run = outcome_along(found.curve, posed.asked.driven, scene.analysis[0], solution.model, None, at)
     moved = with_motor_coordinates(replace(run, twists=found.gears), with_compliance(solution.model))
-    needed = required_forces(with_compliance(solution.model), moved, at)
+    needed = required_forces(MultibodySystem(with_compliance(solution.model)), moved, at)
     modes, torques = posed.asked.driven.of_modes, [found.gears[name].torque(at) for name in problem.gears.joints]
     off = np.abs(needed[:, modes] - found.voltage(at) @ problem.Phi_V.T).max(axis=0)
     assert np.all(off < 1e-5 * np.abs(needed[:, modes]).max())
