@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import zoo
 from beam_links import beam_link, tube
 from body_equations import absolute_states, accelerated, mechanism_of
 from links import ANGLES, arm, arm_links, quintic
@@ -118,18 +117,6 @@ def test_a_choice_that_turns_out_badly_is_changed():
     assert watched.statistics.evaluations < 0.8 * alone.statistics.evaluations
     for name in ("q", "lambda_", "tau", "F_p"):
         assert relative(getattr(watched, name), getattr(exact, name)) < tolerance, name
-
-
-@pytest.mark.parametrize("name", ["slider-crank", "mixed"])
-@pytest.mark.parametrize("integrator", ["radau", "generalized-alpha"])
-def test_implicit_integrators_agree_with_dop853_on_every_kind_of_joint(name, integrator):
-    model = zoo.build(name)
-    keys = {"end": 0.05, "output_step": 0.01}
-    exact = run(model, pcid(tolerance=1e-9, integrator="dop853", **keys))
-    outcome = run(model, pcid(tolerance=1e-3, integrator=integrator, **keys))
-    assert outcome.status == "completed"
-    peak = np.abs(exact.lambda_).max()
-    assert np.abs(outcome.lambda_ - exact.lambda_).max() < 1e-3 * peak
 
 
 def test_smooth_starts_of_links_with_many_modes_are_not_followed_into_round_off():

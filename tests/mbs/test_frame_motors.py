@@ -10,9 +10,9 @@ from beam_links import beam_link, rectangle
 from body_equations import Accelerated
 from checkpoint_mechanisms import CASES, load
 from checkpoint_scenes import as_scene, checkpoint_scene, coordinates, motor_on_frames, tree_model
-from mechanisms import pcid, relative
+from mechanisms import pcid
 from moving_trees import state_of
-from oracle_runs import evaluated, posture_of, run
+from oracle_runs import run
 from random_mechanisms import random_tree
 
 import ffrobot
@@ -103,21 +103,6 @@ def test_gears_do_not_give_between_frames_where_modes_tilt_their_axis():
     )  # fmt: skip
     with pytest.raises(ffrobot.InputError, match=r"modes tilt the joint's axis .\"elbow\"."):
         ffrobot.solve(scene)
-
-
-def test_motors_at_frames_and_sections_share_moments_and_differ_in_modal_forces():
-    """With p held, sections and frames turn alike, so τ is the same; the reactions bend the links only at sections."""
-    at_sections, robot = zoo.build("chain of 2"), zoo.build("chain of 2", motors="frame")
-    section, in_tree = evaluated(at_sections, 0.0, *posture_of(at_sections, np.random.default_rng(0))), []
-    for of_bodies, in_section in ((section.q[0], section.outcome.q[0]), (section.v[0], section.outcome.v[0])):
-        turns = [of_bodies[section.coordinates(name)][2] for name in ("b1", "b2")]
-        moved = in_section.copy()  # frames turn against each other by the coordinates of these motors
-        moved[[robot.model.columns(joint)[0] for joint in ("j1", "j2")]] = turns[0], turns[1] - turns[0]
-        in_tree.append(moved)
-    frame = evaluated(robot, 0.0, *in_tree)
-    assert relative(frame.q, section.q) < 1e-12
-    assert relative(frame.tau[0], section.tau[0]) < 1e-12
-    assert relative(frame.F_p[0], section.F_p[0]) > 1e-2
 
 
 def test_too_few_named_motors_are_refused():

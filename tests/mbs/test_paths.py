@@ -1,6 +1,5 @@
 """Paths as machines run them: laws of motion, limits, legs with holds, shapers."""
 
-from itertools import pairwise
 from math import inf
 
 import numpy as np
@@ -16,7 +15,6 @@ from ffrobot.mbs.fields.paths import (
     law_within,
     path_of,
     polynomial_law,
-    shaped,
 )
 
 LAWS = [("rest-to-rest", 2), ("rest-to-rest", 4), ("s-curve", 2), ("s-curve", 4), ("trapezoid", 1)]
@@ -140,25 +138,3 @@ def test_wrong_frequencies_matter_less_to_zvd_and_ei():
     np.testing.assert_allclose(zvd, zv**2, atol=1e-12)
     widths = [np.ptp(f[v <= RESIDUAL + 1e-9]) for v in (zv, zvd, ei)]
     assert widths == pytest.approx([0.064, 0.286, 0.398], abs=0.002)
-
-
-def test_shaped_motion_leaves_an_oscillator_at_rest():
-    """x'' + 2ζω x' + ω² x = ω² u: integrated with the unshaped and the shaped path."""
-    from scipy.integrate import solve_ivp
-
-    f, zeta = 4.0, 0.02
-    omega, path = 2 * np.pi * f, law_in(0.3, "s-curve", 2)
-
-    def swing(motion):
-        def slope(t, x):
-            u = motion.sample(np.array([t]))[0, 0]
-            return [x[1], omega**2 * (u - x[0]) - 2 * zeta * omega * x[1]]
-
-        x = [0.0, 0.0]
-        for a, b in pairwise(motion.breaks):
-            x = solve_ivp(slope, (a, b), x, rtol=1e-10, atol=1e-12).y[:, -1]
-        return np.hypot(x[0] - 1.0, x[1] / omega)
-
-    assert swing(path) > 0.1
-    assert swing(shaped(path, impulses("zv", f, zeta))) < 1e-8
-    assert swing(shaped(path, impulses("zvd", f, zeta))) < 1e-8

@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from body_equations import absolute_states, accelerated, mechanism_of, required_forces
 from links import TIP, arm, arm_links, quintic, ritz_link
 from mechanisms import forward, make_model, relative, revolute
 from numpy.polynomial import Polynomial
-from oracle_runs import evaluated, run
+from oracle_runs import run
 from tree_oracle import row_values
 
 from ffrobot.common.errors import InputError, SolveError
@@ -22,7 +21,6 @@ from ffrobot.mbs.inversion.zero_dynamics import (
     is_unstable,
     linear_dynamics,
 )
-from ffrobot.mbs.quantities.motion import constraint_rows
 
 C = np.sqrt(30.0)  # √(EI/ρA)/L² of `ritz_link`, 1/s
 
@@ -88,22 +86,6 @@ def test_zeros_of_joint_motion_are_the_frequencies_with_the_joint_locked():
     np.testing.assert_allclose(np.sort(s.imag)[4:], servo.scale, rtol=1e-6)
 
 
-def test_internal_dynamics_are_those_of_the_constrained_and_driven_rows():
-    """M of r is Lᵀ M Z along the tree: Z keeps C_s, L the motors' coordinates (theory.md, Torque-only tracking)."""
-    model = arm()
-    servo, dynamics = at_rest(model)
-    p = equilibrium(servo, 0.0)[None]
-    found = servo.motion.motion([0.0], p, 0 * p, 0 * p, servo.near[:1])
-    motion, tree = evaluated(model, 0.0, found.q[0], 0 * found.v[0]).motion, model.model.tree
-    mechanism, joints = mechanism_of(tree, np.zeros(3)), tree.joint_columns
-    (state,) = absolute_states(mechanism, accelerated(motion))
-    M, C_s = state.B.T @ mechanism.mass_matrix(state.q) @ state.B, constraint_rows(motion)[1][0]
-    L, Z = np.zeros((2, tree.n_v, np.count_nonzero(~joints)))
-    L[~joints] = Z[~joints] = np.eye(L.shape[1])
-    Z[joints] = -np.linalg.solve(C_s[:, joints], C_s[:, ~joints])
-    np.testing.assert_allclose(dynamics.M[0], L.T @ M @ Z, atol=1e-9)
-
-
 def smooth_step():
     """The polynomial from 0 at 0 to 1 at 1 with six derivatives zero at both."""
     bell = Polynomial.fromroots([0.0] * 6 + [1.0] * 6).integ()
@@ -150,17 +132,6 @@ def two_links():
 @pytest.fixture(scope="module")
 def carried(two_links):
     return run(two_links, motors_only())
-
-
-def test_equations_of_motion_hold_with_the_motors_moments(carried):
-    """M v̇ − Q = (τ, 0), by the oracle alone, and the path by kinematics."""
-    motion, tree = carried.motion, carried.robot.model.tree
-    needed = required_forces(carried.robot.model, accelerated(motion), motion.time)
-    given = np.zeros_like(needed)
-    given[:, tree.joint_columns] = carried.tau
-    elastic = max(np.abs(motion.q[:, node.p_q] * node.body.stiffness).max() for node in tree.nodes)
-    assert relative(needed, given, elastic) < 1e-6
-    assert np.abs(off_path(carried)).max() < 1e-12
 
 
 def test_actuation_begins_before_the_path_and_ends_after_it(carried):

@@ -214,18 +214,6 @@ def test_rows_that_repeat_are_a_hold(tmp_path):
     np.testing.assert_allclose(function.sample(t)[0], s**3 * (10 - 15 * s + 6 * s**2), atol=1e-12)
 
 
-def test_stairs_of_many_holds(tmp_path):
-    """As encoders of few bits write them: rests at all of them, and moves of the law from rest to rest between."""
-    levels = np.arange(3000) % 7 / 7.0
-    rows = "".join(f"{k},{level!r}\n" for k, level in enumerate(np.repeat(levels, 2).tolist()))
-    (function,) = load_waypoints(write(tmp_path / "path.csv", f"t,value\n{rows}")).spline.functions()
-    rests = np.arange(len(levels)) * 2.0
-    for s in (0.0, 0.3, 1.0):
-        np.testing.assert_allclose(function.sample(rests + s), [levels, 0 * levels, 0 * levels], atol=1e-14)
-        moved = levels[:-1] + s**3 * (10 - 15 * s + 6 * s**2) * np.diff(levels)
-        np.testing.assert_allclose(function.sample(rests[:-1] + 1 + s)[0], moved, atol=1e-14)
-
-
 @pytest.mark.parametrize(
     ("text", "says"),
     [

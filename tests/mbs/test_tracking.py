@@ -361,21 +361,3 @@ def test_least_effort():
     assert np.abs(found.voltage(times[:2]) - expected).max() < 2e-3
     state = servo.motion.motion(times.tolist(), *motion, servo.postures(times))
     assert np.isfinite(state.q).all()
-
-
-def test_slopes_of_torques():
-    """Dual numbers against differences, in which r is linear in p̈ and quadratic in ṗ."""
-    servo, _ = strip(3, 0.8)
-    rng = np.random.default_rng(0)
-    times = np.array([0.1, 0.4, 0.7])
-    p, v, a = (size * rng.standard_normal((3, 3)) for size in (1e-3, 1e-2, 1.0))
-    h = 1e-6
-    for k, slope in zip((2, 1, 0), servo.slopes(times, p, v, a), strict=True):
-        for mode in range(3):
-            moved = []
-            for sign in (1, -1):
-                state = [p.copy(), v.copy(), a.copy()]
-                state[k][:, mode] += sign * h
-                moved.append(np.concatenate(servo.forces(times, *state), axis=1))
-            expected = (moved[0] - moved[1]) / (2 * h)
-            assert np.abs(slope[:, :, mode] - expected).max() < 1e-6 * max(1.0, np.abs(slope).max())

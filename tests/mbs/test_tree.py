@@ -72,21 +72,6 @@ def test_jacobians_by_differences(turned):
     np.testing.assert_allclose(np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]]), found.L[0, 3:], atol=2e-8)
 
 
-def test_rows_of_loops_hold_where_the_oracle_has_them():
-    """Joints that close loops are where they happen to be: their rows are zero, and as many as the oracle has."""
-    for seed in range(3):
-        tree = random_tree(np.random.default_rng(seed), ["revolute", "spherical", "cylindrical"], loops=2)
-        if any(joint.type == "screw" for joint in tree.loops):
-            continue
-        plain, model, q = built(tree)
-        mechanism = plain.mechanism()
-        for node in model.tree.nodes:
-            q[node.p_q] = mechanism.coordinates.parts(tree.q, node.body.name)[2]
-        C, _ = row_values(model, q[None], np.zeros(1))
-        assert C.shape[1] == sum(len(joint.rows()) for joint in tree.loops)
-        assert np.abs(C).max() < 1e-12
-
-
 def every_row(rng, model):
     """Rows of all kinds between random sections, with targets and orientations that move, for each body."""
     number, axes = _core.TimeFunction.polynomial, np.eye(3)

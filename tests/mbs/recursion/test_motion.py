@@ -97,34 +97,6 @@ def test_orientations_over_time(name):
             np.testing.assert_allclose(A, turn @ exponential(np.array(law.reference)), atol=1e-14)
 
 
-def test_a_section_follows_an_orientation():
-    """A flexible arm on a free base: three rows about axes that turn as told hold, with their rates."""
-    rng = np.random.default_rng(4)
-    turning, rows = r.SpatialMarker(), [row(r.ConstraintKind.rotation, (-1, 1), (1, 1), axis)[0] for axis in np.eye(3)]
-    turning.turns = True
-    bodies = [random_body(rng, 2, J.free).core("a"), random_body(rng, 3, J.revolute).core("b")]
-    bodies[1].parent, bodies[1].parent_marker = 0, 1
-    model = r.SpatialModel(bodies, [r.SpatialMarker(), turning], rows, [], np.array([0, 0, -9.81]))
-    q, v = np.zeros(model.n_q), np.zeros(model.n_v)
-    q[3] = 1
-    reference, _ = model.measure(q, v)
-    functions = [parse_expression(text) for text in ("0.6*t**2", "sin(t)-t", "0.3*t**3")]
-    law = _core.TurningLaw(_core.OrientationKind.rotation_vector, functions, exponential(reference))
-    scene = _core.TreeScene()
-    for _ in rows:
-        scene.add_target(parse_expression("0"))
-    scene.turn_marker(1, law)
-    times = list(np.linspace(0, 0.5, 6))
-    run = _core.tree_motion(model, scene, times, q, v, controls(tolerance=1e-9), on)
-    assert run.status == _core.IntegrationStatus.completed
-    for t, y in zip(times, run.states, strict=True):
-        at = y[: model.n_q], y[model.n_q :]
-        model.derivatives(scene, t, *at, np.zeros(model.n_v))  # puts the marker where it is at time t
-        value, rate = model.measure(*at)
-        assert np.abs(value).max() < 1e-9  # dense output
-        assert np.abs(rate).max() < 1e-6
-
-
 def test_a_run_ends_where_it_is_told_to():
     """What there was is kept; an exception of the caller comes through."""
     rng = np.random.default_rng(0)

@@ -5,21 +5,18 @@ Points of bodies with geometric stiffening move to second order by an affine fie
 
 import numpy as np
 import pytest
-from points_3d import J, Mechanism, Series, r
+from points_3d import J, Mechanism, r
 from random_bodies import (
     GRAVITY,
     JOINTS,
     check_balance,
     ground,
     random_body,
-    random_state,
     random_tree,
     row,
     rows_of_every_kind,
     with_rows,
 )
-
-from ffrobot.mbs import _core
 
 curved_or_not = pytest.mark.parametrize("curved", [False, True], ids=["", "stiffened"])
 FAR = {False: 0.1, True: 0.3}  # modal coordinates
@@ -100,44 +97,3 @@ def test_a_loop(modes, curved):
     ]
     rows = [row(r.ConstraintKind.point, (3, 1), (1, 2), axis) for axis in np.eye(3)]
     check_balance(with_rows(rng, bodies, rows), rng, deflection=FAR[curved])
-
-
-def test_a_driven_joint_coordinate():
-    rng = np.random.default_rng(6)
-    bodies = [random_body(rng, 3, J.revolute), random_body(rng, 3, J.revolute, parent=0, parent_marker=1)]
-    mechanism = Mechanism(bodies, ground(rng), GRAVITY)
-    q, v = random_state(rng, mechanism, mechanism.model())
-    coordinate = mechanism.model().first[1][2]
-    driven, _ = row(r.ConstraintKind.coordinate, (0, 0), (0, 0), (1, 0, 0))
-    driven.coordinate = coordinate
-    mechanism.rows = [driven]
-    model = mechanism.model()
-    a, lambda_ = model.evaluate(q, v, np.array([0.7]), None, None)
-    assert abs(a[coordinate] - 0.7) < 1e-12
-    mechanism.rows, force = [], np.zeros(model.n_v)
-    force[coordinate] = -lambda_[0]
-    along = mechanism.directions(model, q)
-    left, size, _ = mechanism.forces(mechanism.model(), along, q, v, a, [], force, None)
-    assert np.abs(left).max() < 1e-11 * size
-
-
-@curved_or_not
-def test_energy_and_momentum_of_points(curved):
-    """Totals of free bodies in a tree are sums over their points."""
-    rng = np.random.default_rng(7)
-    bodies = [random_body(rng, 4, J.free, curved=curved), random_body(rng, 3, J.universal, curved=curved, parent=0)]
-    mechanism = Mechanism(bodies, ground(rng), GRAVITY)
-    model = mechanism.model()
-    q, v = random_state(rng, mechanism, model, deflection=0.3)
-    z = [Series([0.0, rate, 0.0]) for rate in v]
-    kinetic, gravitational, momentum, angular = 0.0, 0.0, np.zeros(3), np.zeros(3)
-    for body, points in zip(bodies, mechanism.motion(model, q, z)[1], strict=True):
-        place, velocity = points.c[0], points.c[1]
-        kinetic += 0.5 * body.mass @ np.sum(velocity**2, axis=1)
-        gravitational -= body.mass @ place @ GRAVITY
-        momentum += body.mass @ velocity
-        angular += body.mass @ np.cross(place, velocity)
-    found = model.states_totals(_core.TreeScene(), q[None], v[None])[0]
-    np.testing.assert_allclose(found[[0, 2]], [kinetic, gravitational], rtol=1e-12)
-    np.testing.assert_allclose(found[4:7], momentum, rtol=1e-11)
-    np.testing.assert_allclose(found[7:], angular, rtol=1e-11)
