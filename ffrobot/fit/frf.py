@@ -178,7 +178,7 @@ class PoseModel:
 
 
 STEP = 1e-4  # relative, for derivatives of the equations
-LINEAR = 1e-3  # relative error of the linearized equations, from which they are linearized again
+LINEAR = 1e-8  # relative error of linearized equations, from which they are linearized again: high modes dominate it
 REACHED = 1e-9  # of ln θ: a last step
 MOST_PLACES = 30
 NO_EFFECT = 1e-9  # of a parameter at the start, against the largest: small damping has little effect

@@ -9,6 +9,7 @@ import tomli_w
 from beam_links import beam_link, tube
 from rigid_chain import ARM, TOOL, receptance, scene
 from scipy.io import savemat
+from scipy.linalg import eigh
 from scipy.optimize import brentq
 
 import ffrobot
@@ -59,6 +60,23 @@ def test_three_masses_with_noise_are_within_three_deviations(averages):
     off = np.array(off)
     assert np.count_nonzero(np.abs(off).max(axis=1) < 3.0) >= 0.95 * draws
     assert 0.85 < np.sqrt(np.mean(off**2)) < 1.15
+
+
+def loaded(values):
+    """A mass on two modes, the second stiff, in coordinates that it uncouples."""
+    mass, damper = values
+    squares, V = eigh(np.diag([1e4, 1e9]), np.eye(2) + mass)
+    return stacked(np.eye(2), np.diag(squares), damper * V.T @ V, V[:1] + V[1:])
+
+
+def test_deviations_do_not_depend_on_the_start():
+    M, K, D, J = unstacked(loaded(np.array([1.0, 3.0])))
+    w, noise = 2 * np.pi * LINES[:, None, None], np.random.default_rng(5).standard_normal((2, len(LINES), 1))
+    H = (J @ np.linalg.inv(K + 1j * w * D - w**2 * M) @ J.T)[:, :, 0] * (1.0 + 0.02 * (noise[0] + 1j * noise[1]))
+    starts = np.array([[0.9, 2.0], [0.2, 9.0]])
+    fits = [fit_receptances(lambda x: [loaded(x)], ["m", "c"], start, [measured(H)]) for start in starts]
+    for name in ("value", "relative_deviation"):
+        np.testing.assert_allclose(*(getattr(fit, name) for fit in fits), rtol=1e-4)
 
 
 def block(k, d, m, J):
