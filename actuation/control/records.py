@@ -38,8 +38,8 @@ class Sensor(Referring):
     Accelerations are in global axes; "accelerometer" is r̈ − g and "gyro" the angular velocity, in the axes of the
     section. Patches read the charge Φ_Vᵀ p over `capacitance`; none with a `shunt`.
 
-    A reading is filtered by `high_pass`, gets `bias` and Gaussian noise, is cut at ±`range` and rounded to
-    `resolution`, kept for `sample_time`, and known `delay` later.
+    A reading is filtered by `high_pass`, known `delay` later, gets `bias` and Gaussian noise, is cut at ±`range`,
+    rounded to `resolution`, and kept for `sample_time`.
     """
 
     joint: str | None = None
@@ -92,8 +92,8 @@ class Sensor(Referring):
         return self
 
     def deviation(self, T: float) -> float:
-        """Standard deviation of the noise of readings every T (s), in their unit."""
-        return float(np.hypot(self.noise, self.noise_density / np.sqrt(2 * T)))
+        """Standard deviation of the noise of readings, every T (s) unless `sample_time` says another, in their unit."""
+        return float(np.hypot(self.noise, self.noise_density / np.sqrt(2 * (self.sample_time or T))))
 
     def references(self) -> Iterator[Reference]:
         """Yield references to the measured joint, point, layout or body; points of strain belong to the link file."""

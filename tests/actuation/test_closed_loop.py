@@ -57,9 +57,12 @@ def test_commands_stop_at_the_limits_of_the_motors():
     assert record.metrics.saturated == cut > 0
 
 
-def test_noise_is_that_of_the_seed():
+@pytest.mark.parametrize(
+    "noise", [{"noise": 0.02}, {"noise_density": 0.02 * (8 * T) ** 0.5, "sample_time": 4 * T}], ids=lambda of: [*of][0]
+)
+def test_noise_is_that_of_the_seed(noise):
     def readings(seed):
-        sensor = [{"joint": "O", "measure": "rate", "noise": 0.02}, {"joint": "O"}]
+        sensor = [{"joint": "O", "measure": "rate"} | noise, {"joint": "O"}]
         scene = wheel(loop(sensor=sensor, seed=seed))
         record = solve_scene(scene).outcomes["loop"].details
         return record.readings[:, record.outputs.index("joint/O/rate")]
