@@ -58,7 +58,7 @@ def test_commands_stop_at_the_limits_of_the_motors():
 
 
 @pytest.mark.parametrize(
-    "noise", [{"noise": 0.02}, {"noise_density": 0.02 * (8 * T) ** 0.5, "sample_time": 4 * T}], ids=lambda of: [*of][0]
+    "noise", [{"noise": 0.02}, {"noise_density": 0.02 * (8 * T) ** 0.5, "sample_time": 4 * T}], ids=["size", "density"]
 )
 def test_noise_is_that_of_the_seed(noise):
     def readings(seed):
