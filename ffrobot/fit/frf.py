@@ -346,13 +346,19 @@ def fit_receptances(
     for validation are only compared.
 
     Raises:
-        InputError: all poses are for validation, or FRFs do not distinguish the parameters.
+        InputError: all poses are for validation, deviations are known of some FRFs alone, or FRFs do not distinguish
+            the parameters.
         SolveError: the iteration does not converge.
     """
     used = [not pose.test.validation for pose in poses]
     if not any(used):
         raise InputError("fit: expected a test that is not for validation", "none")
     fitted = list(compress(poses, used))
+    seen = np.concatenate([pose.coherence.ravel() >= 0.0 for pose in fitted])
+    averaged = np.array([pose.test.averages is not None for pose in fitted])
+    for key, given in (("coherence", seen), ("averages", averaged)):  # which weigh FRFs against each other
+        if given.any() and not given.all():
+            raise InputError(f"fit: expected {key} of all fitted FRFs or of none", f"{key} of some")
 
     def of_used(values: Array) -> list[Array]:
         return list(compress(equations(values), used))
@@ -382,7 +388,7 @@ def fit_receptances(
         keys=tuple(keys),
         start=start,
         value=theta,
-        **uncertainty_of(J, r, known=all(pose.test.averages is not None for pose in fitted)),
+        **uncertainty_of(J, r, known=bool(averaged.all())),
         poses=tuple(map(PoseComparison, poses, before, _receptances(equations(theta), poses))),
     )
 

@@ -79,6 +79,14 @@ def test_deviations_do_not_depend_on_the_start():
         np.testing.assert_allclose(*(getattr(fit, name) for fit in fits), rtol=1e-4)
 
 
+@pytest.mark.parametrize("keys", [{"coherence": 0.9}, {"coherence": 0.9, "averages": 5}])
+def test_deviations_of_some_tests_alone_are_refused(keys):
+    """Others would count as if their FRFs were known to a factor of e."""
+    tests = measured(np.ones((len(LINES), 1)), **keys), measured(np.ones((len(LINES), 1)))
+    with pytest.raises(InputError, match="coherence of all fitted FRFs or of none"):
+        fit_receptances(lambda x: [loaded(x)] * 2, ["m", "c"], np.ones(2), tests)
+
+
 def block(k, d, m, J):
     return stacked(np.diag(m), np.diag(k), np.diag(d), np.array(J))
 
