@@ -89,7 +89,8 @@ VIRTUAL[:] = h5py.VirtualSource("elsewhere.h5", "x", shape=(3, 3))
         ("second_moment", {"shape": (3, 3), "dtype": "f8", "external": [("elsewhere", 0, 72)]}, "or external dataset"),
         ("mesh/points", {"shape": (10**7, 10**6), "dtype": "f8"}, "expected 8e"),
         ("second_moment", -np.eye(3), "second_moment, as inertia about the center of mass: expected no"),
-        ("invariants/S_bar", np.full((3, 10), 9.0), "modal_mass, less S_bar: expected no negative"),
+        ("invariants/S_bar", np.full((3, 10), 9.0), "modal_mass, less S_bar and I_bar: expected no negative"),
+        ("invariants/I_bar", np.arange(90.0).reshape(3, 3, 10), "modal_mass, less S_bar and I_bar: expected no"),
     ],
 )
 def test_doctored_modal_bodies(modal, name, item, named):

@@ -9,7 +9,9 @@ import numpy as np
 
 from ...common.arrays import Array, Integers
 from ...common.errors import InputError
+from ...common.rotations import skew
 from .parts import (
+    LEVI_CIVITA,
     AlongAxis,
     Frozen,
     Integrals,
@@ -217,22 +219,26 @@ def _problems(body: ModalBody) -> Iterator[str]:
 
 def _inertia(body: ModalBody) -> Iterator[str]:
     """Kinetic energy is positive in every motion: about the center of mass, and with what the modes carry along."""
-    second = body.second_moment - np.outer(body.first_moment, body.first_moment) / body.mass
+    center, S = body.first_moment / body.mass, body.S_bar
+    second = body.second_moment - np.outer(body.first_moment, center)
     about_center = np.trace(second) * np.eye(3) - second  # inertia of a mass on an interface may be about z alone
-    relative = body.modal_mass - body.S_bar.T @ body.S_bar / body.mass
-    matrices = {"second_moment, as inertia about the center of mass": about_center, "modal_mass, less S_bar": relative}
-    for name, matrix in matrices.items():
-        yield from _positive(name, matrix, POSITIVE_TOLERANCE * np.abs(matrix).max(initial=0.0))
+    spin = np.einsum("abc,bcn->an", LEVI_CIVITA, body.I_bar) - skew(center) @ S
+    turning = spin.T @ np.linalg.pinv(about_center, POSITIVE_TOLERANCE, hermitian=True) @ spin
+    by_axis = np.einsum("kkab->kab", body.S_bar_kl) - np.einsum("ka,kb->kab", S, S) / body.mass
+    by_axis[2] -= 0.0 if body.S_spin is None else body.S_spin
+    yield from _positive("second_moment, as inertia about the center of mass", about_center, np.abs(about_center).max())
+    yield from _positive("modal_mass, less S_bar and I_bar", body.modal_mass - S.T @ S / body.mass - turning)
+    yield from _positive("S_bar_kl[k, k], less S_bar and S_spin", by_axis)
 
 
-def _positive(name: str, matrix: Array, round_off: float) -> Iterator[str]:
-    lowest = np.linalg.eigvalsh((matrix + matrix.T) / 2).min(initial=0.0)
-    if lowest < -round_off:
+def _positive(name: str, matrix: Array, scale: float = 1.0) -> Iterator[str]:
+    lowest = np.linalg.eigvalsh((matrix + matrix.swapaxes(-1, -2)) / 2).min(initial=0.0)
+    if lowest < -POSITIVE_TOLERANCE * scale:
         yield f"{name}: expected no negative eigenvalue, found {lowest:.3g}"
 
 
 def _spin(body: ModalBody) -> Iterator[str]:
-    """Spin inertia is known whole or not at all; its energy is positive, and S_bar_33 holds that of the modes."""
+    """Spin inertia is known whole or not at all; its energy is positive."""
     parts = {name: getattr(body, name) for name in ("J_spin", "h_spin", "S_spin")}
     missing = [name for name, value in parts.items() if value is None]
     if missing:
@@ -243,12 +249,8 @@ def _spin(body: ModalBody) -> Iterator[str]:
     J, h, S = parts.values()
     if not J >= 0:
         yield f"J_spin: expected a number not below 0, found {J}"
-    matrices = {
-        "S_spin, less h_spinᵀ h_spin / J_spin": S - (np.outer(h, h) / J if J else np.abs(S) + np.outer(h, h)),
-        "S_bar_kl[2, 2], less S_spin": body.S_bar_kl[2, 2] - S,
-    }
-    for name, matrix in matrices.items():
-        yield from _positive(name, matrix, IDENTITY_TOLERANCE * np.abs(body.S_bar_kl[2, 2]).max(initial=0.0))
+    of_modes = S - (np.outer(h, h) / J if J else np.abs(S) + np.outer(h, h))
+    yield from _positive("S_spin, less h_spinᵀ h_spin / J_spin", of_modes)
 
 
 def _interfaces(body: ModalBody) -> Iterator[str]:

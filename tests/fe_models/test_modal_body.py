@@ -50,8 +50,8 @@ def body(coefficients):
         modal_mass=np.eye(2),
         damping_ratio=np.zeros(2),
         family=("in-plane-bending",) * 2,
-        S_bar=np.full((3, 2), 0.5),
-        I_bar=np.ones((3, 3, 2)),
+        S_bar=np.array([[0.0] * 2, [0.3] * 2, [0.0] * 2]),
+        I_bar=np.zeros((3, 3, 2)),
         S_bar_kl=S_bar_kl,
         interfaces={
             "root": Interface(position[0], translation[0], rotation[0]),

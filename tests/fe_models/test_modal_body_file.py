@@ -86,7 +86,7 @@ POINT = StressPoint(np.zeros(3), np.zeros((6, 11)), np.zeros((6, N)))
         ({"J_spin": -1.0}, "J_spin: expected a number not below 0, found -1"),
         ({"J_spin": 0.0}, "S_spin, less h_spin.* expected no negative eigenvalue"),
         ({"h_spin": np.ones(N)}, "S_spin, less h_spin.* expected no negative eigenvalue"),
-        ({"S_spin": 2 * np.eye(N)}, r"S_bar_kl\[2, 2\], less S_spin: expected no negative eigenvalue"),
+        ({"S_spin": 2 * np.eye(N)}, r"S_bar_kl\[k, k\], less S_bar and S_spin: expected no negative eigenvalue"),
         ({"S_spin": np.triu(np.ones((N, N)))}, "S_spin: expected symmetric"),
     ],
 )
