@@ -38,7 +38,7 @@ class Column(NamedTuple):
     values: ComplexArray
     coherence: Array | None
     order: int | None = None  # of the time derivative: 0 receptance, 1 mobility, 2 accelerance
-    is_si: bool = False  # whether the file's label of units is SI's, or empty
+    is_si: bool = False  # whether the file's units are SI's, by their label, if any, and dataset 164
 
 
 def read_columns(path: Path) -> list[Column]:
@@ -61,7 +61,9 @@ def _universal(path: Path) -> Iterator[Column]:
     read_bytes(path, "universal file")
     try:
         file = pyuff.UFF(str(path))
-        sets = [file.read_sets(k) for k in np.flatnonzero(np.array(file.get_set_types()) == 58).tolist()]
+        kinds = np.array(file.get_set_types())
+        sets, units = ([file.read_sets(k) for k in np.flatnonzero(kinds == kind).tolist()] for kind in (58, 164))
+        is_of_si = all(one["length"] == one["force"] == 1.0 for one in units)
         for one in sets:
             one["data"].real, one["x"], one["func_type"]
     except Exception:  # whatever pyuff finds in a file that is none
@@ -79,7 +81,7 @@ def _universal(path: Path) -> Iterator[Column]:
             )
         force, response = (f"{node:g}/{_axis(axis)}" for node, axis in (at[:2], at[2:]))
         label = str(one["ordinate_axis_units_lab"]).strip().lower()
-        is_si = label in ("", "none", *LABELS[ORDERS[kind]])
+        is_si = is_of_si and label in ("", "none", *LABELS[ORDERS[kind]])
         frequency, values = np.asarray(one["x"], float), one["data"].astype(complex)
         yield Column(force, response, frequency, values, coherence.get(at), order=ORDERS[kind], is_si=is_si)
 
@@ -144,10 +146,10 @@ def _of_mat(path: Path) -> Iterator[Column]:
 G = 9.80665  # m/s²
 UNITS = {
     "m/N": (0, 1.0), "mm/N": (0, 1e-3), "µm/N": (0, 1e-6), "m/s/N": (1, 1.0), "mm/s/N": (1, 1e-3), "m/s²/N": (2, 1.0),
-    "g/N": (2, G),
+    "mm/s²/N": (2, 1e-3), "g/N": (2, G),
 }  # fmt: skip
 """Order of the time derivative that was measured (receptance 0, mobility 1, accelerance 2), and factor to SI."""
-Unit = Literal["m/N", "mm/N", "µm/N", "m/s/N", "mm/s/N", "m/s²/N", "g/N"]
+Unit = Literal["m/N", "mm/N", "µm/N", "m/s/N", "mm/s/N", "m/s²/N", "mm/s²/N", "g/N"]
 FLOOR = 1e-3  # relative deviation that no FRF is better known than
 
 

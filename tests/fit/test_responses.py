@@ -252,6 +252,8 @@ def universal(path, H, lines, ends, kind=12, **keys):
     for (force, response), h in zip(ends, H.T, strict=True):
         nodes = {"ref_node": force[0], "ref_dir": force[1], "rsp_node": response[0], "rsp_dir": response[1]}
         sets.append(data | nodes | {"x": lines, "data": h} | keys)
+    if length := keys.get("length"):
+        sets.insert(0, {"type": 164, "units_code": 9, "length": length, "force": 1.0, "temp": 1.0, "temp_offset": 0.0})
     pyuff.UFF(str(path)).write_sets(sets, mode="overwrite")
 
 
@@ -282,7 +284,8 @@ BAD = {
     "UFF of strains": ({"kind": 3}, {}, r"data types 8, 11, 12\) per force \(13\), found types 3 and 13"),
     "UFF of rotations": ({"axis": 4}, {}, "expected translations .*, found 4"),
     "UFF in g": ({"ordinate_axis_units_lab": "g"}, {}, "expected the key unit of the test"),
-    "another quantity": ({}, {"unit": "m/N"}, 'unit: expected that of the file, "m/s²/N" or "g/N", found "m/N"'),
+    "UFF in mm": ({"length": 1000.0}, {}, "expected the key unit of the test"),
+    "another quantity": ({}, {"unit": "m/N"}, 'unit: expected that of the file, "m/s²/N", .* or "g/N", found "m/N"'),
     "an unknown unit": ({}, {"unit": "ft/s²/lbf"}, 'unit: expected "m/N"'),
     "frequency 0": ({"first": 0.0}, {}, "expected frequencies above 0 Hz, found 0: the key band"),
     "no frequency": ({}, {"band": [900.0, 950.0]}, "band: expected frequencies of the file within it"),
