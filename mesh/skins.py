@@ -20,9 +20,10 @@ READ = (".3mf", ".dae", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
 
 
 def loaded_skin(path: Path, scale: Sequence[float], d: Array, C: Array) -> trimesh.Trimesh:
-    """Read the mesh in `path`; coordinates times `scale` (3,) are m, then turned by C (3, 3) and moved by d (3,), m.
+    """Read the mesh in `path`, turned by C (3, 3) and moved by d (3,), m.
 
-    Raises `ModuleNotFoundError` without trimesh, `InputError` if the file is missing, damaged or of another format.
+    Coordinates times `scale` (3,) are in m, or in the unit that the file states. Raises `ModuleNotFoundError` without
+    trimesh, `InputError` if the file is missing, damaged or of another format.
     """
     import trimesh
 
@@ -30,6 +31,8 @@ def loaded_skin(path: Path, scale: Sequence[float], d: Array, C: Array) -> trime
         raise InputError(f"expected a mesh in one of {', '.join(READ)}", path.name)
     try:
         loaded = trimesh.load(path, force="mesh")
+        if loaded.units:  # of DAE and 3MF
+            loaded.convert_units("meters")
         loaded.merge_vertices(merge_tex=True, merge_norm=True)  # of faces that meet with several normals
     except ModuleNotFoundError:
         raise

@@ -61,7 +61,8 @@ class Visual(Record):
     """A shape that pictures show of a rigid body, without effect on the motion: mesh, box, cylinder or sphere."""
 
     mesh: PathName | None = None
-    """File of a surface (.stl, .obj, .dae …), from the folder of the scene on; coordinates in m."""
+    """File of a surface (.stl, .obj, .dae …), from the folder of the scene on; in m, or in the unit that DAE and 3MF
+    files state."""
     scale: Vector3 = (1.0, 1.0, 1.0)
     """Factors of the coordinates of `mesh` along its axes."""
     box: tuple[Positive, Positive, Positive] | None = None
