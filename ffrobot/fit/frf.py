@@ -39,7 +39,6 @@ from .fitting import Motors, RobotTarget, VariedKeys
 from .frf_measured import MeasuredPose, read_tests
 from .least_squares import MOST_EVALUATIONS, Parameters, check_distinguishable, uncertainty_of
 
-UNSEEN = 0.5  # relative deviation of a parameter from which the tests hardly see it
 POOR = 0.8  # FRAC of an FRF that the model hardly has
 HEADING = ("test", "used for", "FRFs", "least FRAC", "mean FRAC", "peaks: largest error", "misfit")
 
@@ -245,10 +244,7 @@ class ResponseFit(Parameters):
         return HEADING, map(PoseComparison.row, self.poses)
 
     def remarks(self) -> Iterator[str]:
-        """Yield notes on parameters with large deviations, and on FRFs that the model lacks."""
-        for key, deviation in zip(self.keys, self.relative_deviation, strict=True):
-            if deviation > UNSEEN:
-                yield f"the tests hardly see {key}: its standard deviation is {100 * deviation:.2g} % of it"
+        """Yield notes on the accuracy of the fit, and on FRFs that the model lacks."""
         yield from super().remarks()
         for one in self.poses:
             for label, frac in zip(one.pose.labels, one.frac, strict=True):

@@ -21,6 +21,7 @@ NO_EFFECT = 1e-4  # of a parameter, or a combination, against the largest: diffe
 SHARE = 0.1  # of the largest: entries of a combination that are named
 MOST_EVALUATIONS = 100
 FEW = 30  # degrees of freedom below which 95 % is more than two standard deviations
+UNSEEN = 0.5  # relative deviation of a parameter from which the measurement hardly determines it
 ALIKE = 0.95  # correlation of errors from which parameters are hardly distinguishable
 
 Frequencies = Callable[[Array], Array]
@@ -56,7 +57,10 @@ class Parameters(ABC):
         """Heading and rows of a table that compares the measurement with the model."""
 
     def remarks(self) -> Iterator[str]:
-        """Yield notes on the accuracy of the fit; here on pairs of parameters that are hardly distinguishable."""
+        """Yield notes on the accuracy of the fit; here on parameters that are hardly known, alone or in pairs."""
+        for key, deviation in zip(self.keys, self.relative_deviation, strict=True):
+            if deviation > UNSEEN:
+                yield f"{key} is hardly determined: its standard deviation is {100 * deviation:.2g} % of it"
         for i, j in zip(*np.triu_indices(len(self.keys), 1), strict=True):
             if abs(self.correlation[i, j]) > ALIKE:
                 yield (

@@ -58,6 +58,9 @@ def test_few_degrees_of_freedom_are_named():
     assert "estimated from 2 degrees of freedom: the range of 95 % is ± 4.3 of them" in told
     known = fit_frequencies(chain, KEYS, 1.3 * TRUE, LABELS, noisy, 0.01 * noisy)
     assert "degrees of freedom" not in "\n".join(known.remarks())
+    assert "hardly determined" not in told
+    vague = fit_frequencies(chain, KEYS, 1.3 * TRUE, LABELS, noisy, noisy)
+    assert any(line.startswith(f"{KEYS[0]} is hardly determined") for line in vague.remarks())
 
 
 def test_as_many_frequencies_as_parameters_leave_the_uncertainty_open():
