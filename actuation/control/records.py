@@ -51,7 +51,7 @@ class Sensor(Referring):
     pzt: str | None = None
     """Layout of patches with measured voltages, V: its name, or that of its body."""
     modal: str | None = None
-    """Body with directly read modal coordinates (m·√kg); no real sensor can."""
+    """Body with directly read modal coordinates (m·√kg) of its modes with point masses and patches; no sensor can."""
     strain: PointReference | None = None
     """Point "BODY.POINT" among the `stress` points of a link, with measured strain along the link."""
     measure: Measure = "value"
