@@ -53,11 +53,11 @@ class StateSpace:
 
     def inputs(self, names: Names) -> list[int]:
         """Indices of inputs (columns of B) by name. Raises `InputError` for unknown ones."""
-        return _numbers("input", names, self.input_names)
+        return numbers(names, self.input_names, "linear model: expected an input")
 
     def outputs(self, names: Names) -> list[int]:
         """Indices of outputs (rows of C) by name. Raises `InputError` for unknown ones."""
-        return _numbers("output", names, self.output_names)
+        return numbers(names, self.output_names, "linear model: expected an output")
 
     def arrays(self) -> dict[str, Any]:
         """Return arrays, names and `time` of the model, as files contain them."""
@@ -251,13 +251,13 @@ def _some(names: tuple[str, ...]) -> str:
     return ", ".join(names[:SHOWN]) + (", …" if len(names) > SHOWN else "")
 
 
-def _numbers(kind: str, names: Names, known: tuple[str, ...]) -> list[int]:
-    places = {name: k for k, name in enumerate(known)}
-    wanted = [names] if isinstance(names, str) else list(names)
+def numbers(names: Names, known: Sequence[str], expected: str) -> list[int]:
+    """Return indices of `names` among `known` ones. Raises `InputError` with the text `expected` for others."""
+    wanted = [names] if isinstance(names, str) else names
     for name in wanted:
-        if name not in places:
-            check_known(name, known, f"linear model: expected an {kind} ({quoted(known)})")
-    return [places[name] for name in wanted]
+        if name not in known:
+            check_known(name, known, f"{expected} ({quoted(known)})")
+    return [known.index(name) for name in wanted]
 
 
 @kept

@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ...common.arrays import Array, Indices
-from ...common.errors import InputError, SolveError, quoted
+from ...common.errors import InputError, SolveError
 from ...common.structs import struct
 from ...mbs.linear.linearisation import LinearEquations, LinearMechanism, labelled
 from ...mbs.model.body import Body
@@ -27,6 +27,7 @@ from ..context import ActuatedContext
 from ..patches.link_patches import LinkPatches
 from ..patches.patches import voltage_gain
 from .linear import with_voltages
+from .linear_model import numbers
 from .records import Controller, JointPid, Lqr, ModalVelocity, PythonController, Sensor
 from .signals import check_joint, volts_on_file
 
@@ -304,16 +305,11 @@ class Setup:
     def columns(self, *names: str) -> Indices:
         """Return indices (names,) of readings in y, or of their estimates. Raises `InputError` for unknown ones."""
         of = [f"estimate/{name}" if self.has_estimates and name not in self.outputs else name for name in names]
-        return self._indices(of, self.outputs, "readings")
+        return np.array(numbers(of, self.outputs, "controller: expected readings"), dtype=int)
 
     def places(self, *names: str) -> Indices:
         """Return indices (names,) of commands in u. Raises `InputError` for a joint without motor."""
-        return self._indices(names, self.inputs, "commands")
-
-    def _indices(self, names: Sequence[str], among: Sequence[str], of: str) -> Indices:
-        if missing := [name for name in names if name not in among]:
-            raise InputError(f"controller: expected {of}, {quoted(among)}", quoted(missing))
-        return np.array([among.index(name) for name in names], dtype=int)
+        return np.array(numbers(names, self.inputs, "controller: expected commands"), dtype=int)
 
     def patch_places(self, body: str) -> Indices:
         """Return indices (k,) in u of the voltages of a body's patches."""

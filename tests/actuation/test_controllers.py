@@ -92,7 +92,7 @@ def test_a_function_of_the_user_acts_like_the_same_controller_of_the_scene(tmp_p
         ("return 10**400", r"OverflowError: int too large to convert to float"),
         (
             "return setup.columns('none')",
-            r'InputError: .*expected readings, "joint/O", found "none" \(line \d+ of \w+\.py, in \w+\)',
+            r'InputError: .*expected readings \("joint/O"\), found "none" \(line \d+ of \w+\.py, in \w+\)',
         ),
     ],
 )
