@@ -18,6 +18,7 @@ from ..mbs.linear.vibration import frequencies_along
 from ..mbs.model.model import Model
 from ..mbs.scene.analysis import TimedAnalysis
 from ..mbs.scene.trajectories import Shaper
+from ..scene.plausibility import remarks_on_times
 from ..scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -163,6 +164,7 @@ def with_paths(scene: Scene, model: Model, judge: Judge, stage: Callable[[str], 
     notes += [f'trajectory "{name}": {hold}' for name, hold in splines if hold]
     shapers = {one.name: one.shaper for one in scene.trajectory if one.shaper is not None}
     asking = {name: shaper for name, shaper in shapers.items() if shaper.kind != "none" and shaper.frequency is None}
+    given = scene
     if asking:
         paths = [path for one in scene.trajectory if (path := one.path) is not None]
         begin, end = min(path.begin for path in paths), max(path.end for path in paths)
@@ -181,4 +183,6 @@ def with_paths(scene: Scene, model: Model, judge: Judge, stage: Callable[[str], 
         stage("fastest motion")
         scene, note = fastest(scene, judge)
         notes.append(note)
+    if scene is not given:
+        notes += remarks_on_times(scene)
     return scene, tuple(notes)

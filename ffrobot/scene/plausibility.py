@@ -63,7 +63,9 @@ def remarks(scene: Scene) -> Iterator[str]:
     yield from _patches(scene, links)
     yield from _voltages(scene)
     yield from _angles(scene)
-    yield from _times(scene)
+    found = (one.fastest or ((of := one.shaper) and of.kind != "none" and not of.frequency) for one in scene.trajectory)
+    if not any(found):  # by the run
+        yield from remarks_on_times(scene)
     for analysis in scene.analysis:
         if analysis.kind == "tracking":  # known before the search, which takes minutes
             from ..mbs.tracking.advice import rough_ends
@@ -242,7 +244,8 @@ def _angles(scene: Scene) -> Iterator[str]:
                 )
 
 
-def _times(scene: Scene) -> Iterator[str]:
+def remarks_on_times(scene: Scene) -> Iterator[str]:
+    """Yield remarks on trajectories that begin or end at other times than the runs."""
     for analysis in scene.analysis:
         if not analysis.follows_trajectories or not analysis.last_time:
             continue

@@ -52,7 +52,7 @@ class Shaper(Record):
     frequency: Positive | tuple[Positive, ...] | None = None
     """Frequencies of the vibrations, Hz: one or several; by default those of the robot."""
     damping_ratio: Annotated[float, Field(ge=0.0, lt=1.0)] | None = None
-    """Damping ratio of these vibrations; by default that of the robot, and 0 with `frequency`."""
+    """Damping ratio of these vibrations; by default the mean of the robot's, and 0 with `frequency`."""
     modes: Annotated[int, Field(gt=0, le=4)] = 1
     """Number of the robot's lowest vibrations."""
 

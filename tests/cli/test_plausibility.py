@@ -47,6 +47,8 @@ def arm(end=1.0, body=BAR, payload=(), tool=(), joint=(), gravity=-9.81, **path)
         ({"via": [0.0, 1.0], "duration": 2.0}, "ends at 2 s, the run at 1 s: the rest of it is not followed"),
         ({"via": [0.0, 1.0], "duration": 2.0, "start": 1.5}, "begins at 1.5 s, when the run is over (1 s)"),
         ({"via": [0.0, 1.0], "duration": 0.2}, "ends at 0.2 s, and rests for the other 0.8 s"),
+        ({"via": [0.0, 1.0], "duration": 0.2, "shaper": {"kind": "none"}}, "ends at 0.2 s, and rests"),
+        ({"via": [0.0, 1.0], "duration": 0.2, "shaper": {"kind": "zv"}}, None),  # later: the run finds it
         ({"value": "t", "body": {**BAR, "center": [500.0, 0.0]}}, "is 500 m long: units are SI; is this in mm?"),
         ({"value": "t", "body": {**BAR, "mass": 2e6}}, "a mass of 2e+06 kg: units are SI; is it in g?"),
         ({"value": "t", "payload": [{"point": "arm.tip", "mass": 500.0}]}, "500 kg on a robot of 1 kg"),
