@@ -102,7 +102,7 @@ def modal_velocity(record: ModalVelocity, setup: Setup) -> LinearFeedback:
         else:
             columns, modes = setup.modal_columns(name, link.own.shape[1]), link.own[:m]
         damping = link.gain[:, :m] * (2 * record.damping_ratio * link.omega[:m])
-        G[np.ix_(setup.patch_places(name), columns)] = damping @ modes
+        G[np.ix_(setup.places(*link.inputs), columns)] = damping @ modes
         bandwidth = max(bandwidth, float(link.omega[m - 1]))
     P, D = (np.zeros_like(G), G) if record.sensor == "pzt" else (G, None)
     return LinearFeedback(setup, P, D, bandwidth=bandwidth)
@@ -255,12 +255,11 @@ class LqrControl:
 
     def __init__(self, record: Lqr, setup: Setup, beside: Sequence[JointPid]) -> None:
         model = design_model(record, setup, beside if record.inputs == "patches" else ())
-        motors = [] if record.inputs == "patches" else [f"joint/{name}" for name in setup.robot.motors]
+        names = [] if record.inputs == "patches" else [f"joint/{name}" for name in setup.robot.motors]
         patches = {} if record.inputs == "motors" else setup.robot.patches
-        acting = [*setup.places(*motors), *(i for body in patches for i in setup.patch_places(body))]
-        left_out = {of for of in setup.inputs if record.pzt is not None and of.split("/")[1] not in record.pzt}
-        self.inputs = [i for i in acting if not setup.inputs[i].startswith("pzt/") or setup.inputs[i] not in left_out]
-        names = [setup.inputs[i] for i in self.inputs]
+        every = (name for of in patches.values() for name in of.inputs)
+        names += (name for name in every if record.pzt is None or name.split("/")[1] in record.pzt)
+        self.inputs = setup.places(*names)
         if not names:
             raise InputError("controller lqr: expected motors or patches as inputs", "none")
         self.warnings = _out_of_reach(record, setup, model, names)

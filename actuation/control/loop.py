@@ -44,9 +44,8 @@ class Loop:
     ) -> None:
         samples, T = (len(setup.times), len(read)), setup.sample_time
         noise = np.array([signal.sensor.deviation(T) for signal in read])
-        self._errors = np.array([signal.sensor.bias for signal in read]) + np.zeros(samples)
-        if noise.any():
-            self._errors += np.random.default_rng(seed).standard_normal(samples) * noise
+        bias = np.array([signal.sensor.bias for signal in read])
+        self._errors = bias + np.random.default_rng(seed).standard_normal(samples) * noise
         resolution = np.array([signal.sensor.resolution for signal in read])
         self._coarse = np.flatnonzero(resolution)
         self._resolution = resolution[self._coarse]

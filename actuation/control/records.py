@@ -92,7 +92,7 @@ class Sensor(Referring):
         return self
 
     def deviation(self, T: float) -> float:
-        """Standard deviation of the noise of readings, every T (s) unless `sample_time` says another, in their unit."""
+        """Standard deviation of the noise of readings, in their unit; T (s) is the sample time of the loop."""
         return float(np.hypot(self.noise, self.noise_density / np.sqrt(2 * (self.sample_time or T))))
 
     def references(self) -> Iterator[Reference]:

@@ -66,13 +66,9 @@ class RigidArm:
         for own, node in zip(free.tree.nodes, model.tree.nodes, strict=True):
             self._q[own.q] = q[node.q]
 
-    def angles(self) -> Array:
-        """Return current motor coordinates (motors,), rad or m."""
-        return self._model.constraints.values(self._q[None], np.zeros(1))[0][0, self._motors]
-
     def mobility(self) -> Array:
         """Return accelerations (motors,) of each motor per unit torque of its own, others free, at rest; SI units."""
-        angles = self.angles()
+        angles = self._model.constraints.values(self._q[None], np.zeros(1))[0][0, self._motors]
         return np.diag(np.linalg.inv(self.terms(angles, np.zeros_like(angles))[0]))
 
     def place(self, gamma: Array) -> tuple[Array, Array]:
@@ -310,10 +306,6 @@ class Setup:
     def places(self, *names: str) -> Indices:
         """Return indices (names,) of commands in u. Raises `InputError` for a joint without motor."""
         return np.array(numbers(names, self.inputs, "controller: expected commands"), dtype=int)
-
-    def patch_places(self, body: str) -> Indices:
-        """Return indices (k,) in u of the voltages of a body's patches."""
-        return self.places(*self.robot.patches[body].inputs)
 
     def modal_columns(self, body: str, m: int, ending: str = "/rate") -> Indices:
         """Return indices (m,) in y of the lowest m modal rates of a body, or of coordinates for an empty `ending`."""

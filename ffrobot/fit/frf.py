@@ -308,7 +308,7 @@ class _Residuals:
         return found.x
 
 
-def differentiated(equations: Equations, values: Array, place: Sequence[Array]) -> list[list[Array]]:
+def differentiated(equations: Equations, values: Array, place: Sequence[Array]) -> list[tuple[Array, ...]]:
     """Return derivatives of the poses' equations, [pose][parameter], by forward differences per unit of parameter.
 
     `place`: M, K, D, J of each pose in one array (`stacked`), as `equations` returns them at parameters `values` (n,).
@@ -317,7 +317,7 @@ def differentiated(equations: Equations, values: Array, place: Sequence[Array]) 
     for step in np.diag(STEP * values):
         pairs = zip(equations(values + step), place, strict=True)
         found.append([(ahead - here) / step.sum() for ahead, here in pairs])
-    return [list(of_pose) for of_pose in zip(*found, strict=True)]
+    return list(zip(*found, strict=True))
 
 
 def _receptances(equations: Sequence[Array], poses: Sequence[MeasuredPose]) -> list[ComplexArray]:
@@ -342,19 +342,17 @@ def fit_receptances(
     for validation are only compared.
 
     Raises:
-        InputError: all poses are for validation, deviations are known of some FRFs alone, or FRFs do not distinguish
-            the parameters.
+        InputError: no pose to fit, deviations of some FRFs alone, or parameters that FRFs do not distinguish.
         SolveError: the iteration does not converge.
     """
     used = [not pose.test.validation for pose in poses]
     if not any(used):
         raise InputError("fit: expected a test that is not for validation", "none")
     fitted = list(compress(poses, used))
-    seen = np.concatenate([pose.coherence.ravel() >= 0.0 for pose in fitted])
-    averaged = np.array([pose.test.averages is not None for pose in fitted])
-    for key, given in (("coherence", seen), ("averages", averaged)):  # which weigh FRFs against each other
-        if given.any() and not given.all():
-            raise InputError(f"fit: expected {key} of all fitted FRFs or of none", f"{key} of some")
+    averaged = {pose.test.averages is not None for pose in fitted}
+    seen = {bool(known) for pose in fitted for known in pose.coherence.ravel() >= 0.0}
+    if len(averaged) + len(seen) > 2:  # some would count as if known to a factor of e
+        raise InputError("fit: expected coherence, and averages, of all fitted FRFs or of none", "them of some")
 
     def of_used(values: Array) -> list[Array]:
         return list(compress(equations(values), used))
@@ -384,7 +382,7 @@ def fit_receptances(
         keys=tuple(keys),
         start=start,
         value=theta,
-        **uncertainty_of(J, r, known=bool(averaged.all())),
+        **uncertainty_of(J, r, known=True in averaged),
         poses=tuple(map(PoseComparison, poses, before, _receptances(equations(theta), poses))),
     )
 

@@ -162,15 +162,14 @@ def with_paths(scene: Scene, model: Model, judge: Judge, stage: Callable[[str], 
     notes = list(dict.fromkeys(remark for _, table in tables for remark in table.remarks))
     splines = ((one.name, table.abrupt_hold) for one, table in tables if one.profile in (None, "spline"))
     notes += [f'trajectory "{name}": {hold}' for name, hold in splines if hold]
-    shapers = {one.name: one.shaper for one in scene.trajectory if one.shaper is not None}
-    asking = {name: shaper for name, shaper in shapers.items() if shaper.kind != "none" and shaper.frequency is None}
+    asking = ((one.name, of) for one in scene.trajectory if (of := one.shaper) and of.kind != "none")
+    shapers = {name: shaper for name, shaper in asking if shaper.frequency is None}
     given = scene
-    if asking:
+    if shapers:
         paths = [path for one in scene.trajectory if (path := one.path) is not None]
         begin, end = min(path.begin for path in paths), max(path.end for path in paths)
-        frequencies = frequencies_along(model, begin, end, max(shaper.modes for shaper in asking.values()))
-        shapers = {}
-        for name, shaper in asking.items():  # for the mean frequencies and damping along the path
+        frequencies = frequencies_along(model, begin, end, max(shaper.modes for shaper in shapers.values()))
+        for name, shaper in shapers.items():  # for the mean frequencies and damping along the path
             f, ratio = frequencies.frequency[:, : shaper.modes], shaper.damping_ratio
             ranges = (f"{one.mean():.4g} Hz ({one.min():.4g} to {one.max():.4g} along the path)" for one in f.T)
             notes.append(f"{name}: {shaper.kind} shaper for {', '.join(ranges)}")

@@ -83,7 +83,7 @@ def test_deviations_do_not_depend_on_the_start():
 def test_deviations_of_some_tests_alone_are_refused(keys):
     """Others would count as if their FRFs were known to a factor of e."""
     tests = measured(np.ones((len(LINES), 1)), **keys), measured(np.ones((len(LINES), 1)))
-    with pytest.raises(InputError, match="coherence of all fitted FRFs or of none"):
+    with pytest.raises(InputError, match="expected coherence, and averages, of all"):
         fit_receptances(lambda x: [loaded(x)] * 2, ["m", "c"], np.ones(2), tests)
 
 
