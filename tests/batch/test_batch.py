@@ -11,6 +11,7 @@ from functools import partial
 from threading import Timer
 
 import pytest
+import small_robots
 import tomli_w
 from beam_links import beam_link, tube
 
@@ -20,16 +21,7 @@ from ffrobot.batch.worker import own_worker
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.common.version import VERSION
 
-RIGID = {"mass": 2.0, "inertia": 0.05, "center": [0.3, 0.0], "points": {"root": [0.0, 0.0], "tip": [0.6, 0.0]}}
-ARM = {
-    "name": "arm",
-    "gravity": [0.0, -9.81],
-    "body": [{"name": "arm", "rigid": RIGID}],
-    "joint": [{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}],
-    "payload": [{"point": "arm.tip", "mass": 0.5}],
-    "trajectory": [{"name": "swing", "joint": "shoulder", "value": "pi/4*(1 - cos(pi*t))"}],
-    "analysis": [{"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.005}],
-}
+ARM = small_robots.ARM | {"trajectory": small_robots.SWING["trajectory"]}
 BEAM = beam_link(0.6, tube(0.02, 0.016), 10, nu=None, modes={"count": 3, "family": "in-plane-bending"})
 OF = "rms joints.shoulder.moment"
 STUDIES = {

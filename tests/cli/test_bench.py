@@ -1,12 +1,13 @@
 """`ffrobot bench` on a scene of a user: tables, figures, errors that fall with the tolerance, refusals."""
 
-import csv
 import json
 import re
 
 import pytest
 import tomli_w
 from beam_links import beam_link, rectangle
+from small_robots import rows
+from tables_3d import pin, planar
 
 from ffrobot import InputError
 from ffrobot.bench.precision import Point, TimedRun, _is_hopeless
@@ -16,15 +17,13 @@ MODES = {"count": 2, "family": "in-plane-bending", "attachment_modes": False}
 LINK = beam_link(0.5, rectangle(0.01, 0.02), 4, nu=None, name="arm", modes=MODES)
 PATCHES = {"length": 0.1, "width": 0.02, "thickness": 1e-3, "modulus": 63e9, "d31": 110e-12, "structural": False}
 HELD = {"name": "held", "kind": "static"}
-SCENE = {
-    "name": "arm",
-    "gravity": [0.0, -9.81],
-    "body": [{"name": "arm", "link": "arm.toml"}],
-    "joint": [{"name": "shoulder", "type": "revolute", "between": ["ground", "arm.root"]}],
-    "trajectory": [{"name": "lift", "point": "arm.tip", "y": "0.1*sin(t)"}],
-    "pzt": [{"body": "arm", "count": 2} | PATCHES],
-    "analysis": [HELD, {"name": "inverse", "kind": "pcid", "end": 0.02, "output_step": 0.001}],
-}
+SCENE = planar(
+    [{"name": "arm", "link": "arm.toml"}],
+    [pin("shoulder", "ground", "arm.root")],
+    *(HELD, {"name": "inverse", "kind": "pcid", "end": 0.02, "output_step": 0.001}),
+    trajectory=[{"name": "lift", "point": "arm.tip", "y": "0.1*sin(t)"}],
+    pzt=[{"body": "arm", "count": 2} | PATCHES],
+)
 RUN = ("--tolerances", "1e-3,1e-6", "--integrators", "dopri5,dop853", "--repeat", "2")
 INTEGRATES = "expected one that integrates over time, pcid or forward, found"
 
@@ -43,11 +42,6 @@ def done(ffrobot, folder):
     return folder / "scene.bench"
 
 
-def read(path):
-    with path.open(encoding="utf-8", newline="") as stream:
-        return list(csv.DictReader(stream))
-
-
 def error(row, kind):
     return float(row[f"error_{kind}"])
 
@@ -63,13 +57,13 @@ def test_record_says_on_what_and_against_what(done):
 
 
 def test_sources_of_error_add_up(done):
-    rows = {(row["axis"], row["times"]): row for row in read(done / "axes.csv")}
-    own = [rows["mesh", "1"], rows["modes", "1"], rows["time", "1"]]
+    axes = {(row["axis"], row["times"]): row for row in rows(done / "axes.csv")}
+    own = [axes["mesh", "1"], axes["modes", "1"], axes["time", "1"]]
     # frequencies are of order 4, the slopes of modes between nodes, on which patches work, of order 2 to 3
     for kind, factor in {"displacement": 8, "force": 8, "voltage": 3}.items():
-        assert error(rows["mesh", "2"], kind) < error(rows["mesh", "1"], kind) / factor
-        assert error(rows["total", "1"], kind) < 1.05 * sum(error(row, kind) for row in own)
-    assert error(rows["modes", "1.5"], "displacement") < error(rows["modes", "1"], "displacement")
+        assert error(axes["mesh", "2"], kind) < error(axes["mesh", "1"], kind) / factor
+        assert error(axes["total", "1"], kind) < 1.05 * sum(error(row, kind) for row in own)
+    assert error(axes["modes", "1.5"], "displacement") < error(axes["modes", "1"], "displacement")
 
 
 def test_figures(done):
@@ -82,7 +76,7 @@ def test_figures(done):
 def test_runs_over_budget_stay_in_the_table(ffrobot, folder):
     run = ("--tolerances", "1e-6", "--integrators", "dop853,generalized-alpha", "--budget", "0.03")  # 40 000 steps
     assert ffrobot("bench", "scene.toml", *run, "--part", "work-precision", "-o", "short", cwd=folder).returncode == 0
-    explicit, implicit = read(folder / "short" / "work_precision.csv")
+    explicit, implicit = rows(folder / "short" / "work_precision.csv")
     assert (explicit["status"], explicit["repetitions"]) == ("completed", "5")
     assert (implicit["status"], implicit["repetitions"], implicit["error_force"]) == ("over budget", "1", "")
 

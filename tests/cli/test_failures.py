@@ -14,6 +14,7 @@ import h5py
 import numpy as np
 import pytest
 from loops import OWN_CONTROLLER
+from tables_3d import pin, planar
 
 import ffrobot
 from ffrobot.run.solve import solve_scene
@@ -240,20 +241,12 @@ def test_an_analysis_without_outputs_stops_at_once(kept):
     names = [f"b{k}" for k in range(150)]
     rigid = {"mass": 1.0, "center": [0.05, 0.0], "inertia": 1e-3, "points": {"root": [0.0, 0.0], "tip": [0.1, 0.0]}}
     ends = ["ground", *(f"{name}.tip" for name in names)]
-    drive = {"type": "revolute", "motor": True, "stiffness": 1e3, "rotor_inertia": 1e-4}
-    scene = ffrobot.make_scene(
-        name="chain",
-        gravity=[0.0, -9.81],
-        body=[{"name": name, "rigid": rigid} for name in names],
-        joint=[
-            {"name": f"j{name}", "between": [end, f"{name}.root"], **drive}
-            for end, name in zip(ends, names, strict=False)
-        ],
-        analysis=[
-            *([{"name": "fall", "kind": "forward", "end": 1e-9, "output_step": 1e-9}] if kept else []),
-            {"name": "sag", "kind": "static"},
-        ],
-    )
+    drive = {"motor": True, "stiffness": 1e3, "rotor_inertia": 1e-4}
+    joints = [pin(f"j{name}", end, f"{name}.root", **drive) for end, name in zip(ends, names, strict=False)]
+    analyses = [{"name": "fall", "kind": "forward", "end": 1e-9, "output_step": 1e-9}] if kept else []
+    analyses += [{"name": "sag", "kind": "static"}]
+    chain = planar([{"name": name, "rigid": rigid} for name in names], joints, *analyses)
+    scene = ffrobot.make_scene(**chain)
 
     class Stops(Watcher):
         def stage(self, title):

@@ -1,8 +1,7 @@
 """What a scene's Python file imports from below its folder counts as part of it: in sweeps, studies, resumes."""
 
-import csv
-
 import pytest
+import small_robots
 import tomli_w
 from loops import wheel
 
@@ -55,8 +54,8 @@ def folder(tmp_path):
 
 
 def rows(folder):
-    with (folder / "table.csv").open(encoding="utf-8") as file:
-        return [{key: value for key, value in row.items() if "wall_seconds" not in key} for row in csv.DictReader(file)]
+    table = small_robots.rows(folder / "table.csv")
+    return [{key: value for key, value in row.items() if "wall_seconds" not in key} for row in table]
 
 
 @pytest.mark.parametrize(

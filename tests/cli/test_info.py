@@ -5,6 +5,7 @@ from dataclasses import fields
 
 import h5py
 import pytest
+from datasets import datasets
 
 from ffrobot.actuation.control.metrics import Metrics
 from ffrobot.actuation.control.placement import Evaluation
@@ -21,12 +22,6 @@ from ffrobot.present.info import describe
 
 # inverse and forward motion, patches, linear models, compliant gears, motion in 3D
 CASES = ("two_link_patched", "two_link_linear", "compliant_arm", "slider_crank_3d")
-
-
-def datasets(group):
-    found = []
-    group.visititems(lambda name, item: found.append(name) if isinstance(item, h5py.Dataset) else None)
-    return found
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -5,6 +5,7 @@ import subprocess
 import h5py
 import numpy as np
 import pytest
+from datasets import datasets
 from solids import write_solid
 
 
@@ -20,12 +21,8 @@ def link_on_two(ffrobot, mpirun):
 
 
 def arrays(path):
-    found = {}
     with h5py.File(path) as file:
-        file.visititems(
-            lambda name, item: found.update({name: item[()]}) if getattr(item, "dtype", None) == np.float64 else None
-        )
-    return found
+        return {name: item[()] for name, item in datasets(file).items() if item.dtype == np.float64}
 
 
 ALL_THAT_CELLS_ARE_SUMMED_FOR = """

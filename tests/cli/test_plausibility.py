@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from beam_links import beam_link, tube
+from tables_3d import ORIGIN, joint, revolute, rigid
+from tables_3d import scene as spatial
 
 import ffrobot as program
 from ffrobot.fe_models.link_file import read_link
@@ -98,18 +100,11 @@ def test_rough_ends_of_a_tracked_path_are_told_before_the_search(law, told):
 @pytest.mark.parametrize(("yaw", "turns"), [(3.2, True), (3.1, False), (-3.1, False)])
 def test_poses_more_than_half_a_turn_apart(yaw, turns):
     """Of 3.2 rad to the left the shorter way is the one to the right: the section ends where it should, turned back."""
-    point = {"mass": 1.0, "center": [0.0] * 3, "inertia": [0.1] * 3, "points": {"root": [0.0] * 3}}
-    scene = program.make_scene(
-        name="turned",
-        space="spatial",
-        gravity=[0.0] * 3,
-        body=[{"name": "hand", "rigid": point}],
-        joint=[{"name": "air", "type": "free", "between": ["ground", "hand.root"]}],
-        trajectory=[
-            {"name": "pose", "point": "hand.root", "via": [[0.0] * 6, [0.1] + [0.0] * 4 + [yaw]], "duration": 1.0}
-        ],
-        analysis=[{"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 0.5}],
-    )
+    poses = [[0.0] * 6, [0.1] + [0.0] * 4 + [yaw]]
+    path = {"name": "pose", "point": "hand.root", "via": poses, "duration": 1.0}
+    run = {"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 0.5}
+    air = joint("air", "free", "ground", "hand.root")
+    scene = program.make_scene(**spatial([rigid("hand")], [air], run, gravity=ORIGIN, trajectory=[path]))
     found = [text for text in remarks(scene) if "turns the shorter way" in text]
     assert len(found) == turns
     _, _, _, half = program.solve(scene)["inverse/points/hand.root/quaternion"][1]
@@ -178,19 +173,16 @@ PATCH = {"body": "arm", "count": 2, "length": 0.05, "thickness": 3e-4, "width": 
 )
 def test_flexible_scenes_in_3d(patch, interface, joints, expected):
     lump = [{"name": "lump", "position": 0.3, "mass": 0.1, "inertia": interface}] if interface else []
-    scene = program.make_scene(
-        name="arm",
-        space="spatial",
-        gravity=[0.0, 0.0, -9.81],
-        body=[{"name": "arm", "link": LINK | {"interface": lump}}],
-        joint=[{"name": "hub", "type": "revolute", "between": ["ground", "arm.root"], "axis": [0.0, 0.0, 1.0]}],
+    tables = spatial(
+        [{"name": "arm", "link": LINK | {"interface": lump}}],
+        [revolute("hub", "ground", "arm.root")],
+        {"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 0.1},
         pzt=[PATCH | patch],
         load=[{"pzt": "arm", "voltage": ["100*sin(t)", "300*t"]}],
         initial={"joints": {"hub": joints}},
         trajectory=[{"name": "turn", "joint": "hub", "value": "t"}],
-        analysis=[{"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 0.1}],
     )
-    check(remarks(scene), expected)
+    check(remarks(program.make_scene(**tables)), expected)
 
 
 @pytest.mark.parametrize(
@@ -210,12 +202,10 @@ def test_patches_on_each_other(second, told):
     first = {key: value for key, value in first.items() if key != "count"}
     link = LINK | {"geometry": LINK["geometry"] | {"section": {"shape": "rectangle", "height": 0.02, "width": 0.02}}}
     other = {key: value for key, value in (first | {"name": "second"} | second).items() if value is not None}
-    scene = program.make_scene(
-        name="arm", space="spatial", gravity=[0.0, 0.0, 0.0], body=[{"name": "arm", "link": link}],
-        joint=[{"name": "hub", "type": "weld", "between": ["ground", "arm.root"]}],
-        pzt=[first, other], analysis=[{"name": "still", "kind": "static"}],
-    )  # fmt: skip
-    assert any('"first", "second": patches on one place' in line for line in remarks(scene)) is told
+    hub, still = joint("hub", "weld", "ground", "arm.root"), {"name": "still", "kind": "static"}
+    tables = spatial([{"name": "arm", "link": link}], [hub], still, gravity=ORIGIN, pzt=[first, other])
+    found = remarks(program.make_scene(**tables))
+    assert any('"first", "second": patches on one place' in line for line in found) is told
 
 
 def test_outputs_that_do_not_fit_into_memory():

@@ -1,28 +1,24 @@
 """`ffrobot sweep`: grids and samples over any key, failures as rows, taken up again, several processes."""
 
-import csv
 import math
 import tomllib
 from math import prod
 
 import pytest
 import tomli_w
+from small_robots import rows
+from tables_3d import pin, planar
 
 HEIGHTS = "links.rod.geometry.section.diameter=0.004:0.008:3"
 MASSES = "body.crank.rigid.mass=0.03,0.04"
 
 ROD = {"mass": 1.0, "inertia": 1e-9, "center": [0.5, 0.0], "points": {"root": [0.0, 0.0], "tip": [0.5, 0.0]}}
-PENDULUM = {
-    "name": "pendulum",
-    "gravity": [0.0, -9.81],
-    "body": [{"name": name, "rigid": ROD} for name in ("upper", "lower")],
-    "joint": [
-        {"name": "A", "type": "revolute", "between": ["ground", "upper.root"]},
-        {"name": "B", "type": "revolute", "between": ["upper.tip", "lower.root"]},
-    ],
-    "initial": {"angles": {"upper": "-90*deg", "lower": "-90*deg"}},
-    "analysis": [{"name": "at_rest", "kind": "linear"}],
-}
+PENDULUM = planar(
+    [{"name": name, "rigid": ROD} for name in ("upper", "lower")],
+    [pin("A", "ground", "upper.root"), pin("B", "upper.tip", "lower.root")],
+    {"name": "at_rest", "kind": "linear"},
+    initial={"angles": {"upper": "-90*deg", "lower": "-90*deg"}},
+)
 
 
 @pytest.fixture
@@ -36,8 +32,7 @@ def short_scene(case_copy):
 
 
 def table(scene):
-    with (scene.with_suffix(".sweep") / "table.csv").open(encoding="utf-8") as file:
-        return list(csv.DictReader(file))
+    return rows(scene.with_suffix(".sweep") / "table.csv")
 
 
 def deflections(scene):
@@ -47,8 +42,8 @@ def deflections(scene):
 def test_what_is_varied_is_what_is_solved(ffrobot, short_scene):
     """A grid over link and scene; a row equals a solve of the scene with its values written in by hand."""
     ffrobot.ok("sweep", short_scene, "--vary", HEIGHTS, "--vary", MASSES)
-    rows = table(short_scene)
-    assert [(row["links.rod.geometry.section.diameter"], row["body.crank.rigid.mass"]) for row in rows] == [
+    found = table(short_scene)
+    assert [(row["links.rod.geometry.section.diameter"], row["body.crank.rigid.mass"]) for row in found] == [
         (diameter, mass) for diameter in ("0.004", "0.006", "0.008") for mass in ("0.03", "0.04")
     ]
     thin, *_, as_it_is, _, thick = deflections(short_scene)
@@ -64,10 +59,10 @@ def test_what_is_varied_is_what_is_solved(ffrobot, short_scene):
 def test_failures_are_rows(ffrobot, short_scene):
     vary = ["--vary", "body.crank.rigid.mass=0.03,-1", "--vary", "analysis.inverse.max_steps=5,99999"]
     ffrobot.ok("sweep", short_scene, *vary)
-    rows = table(short_scene)
-    assert [row["status"] for row in rows] == ["failed", "completed", "wrong input", "wrong input"]
-    assert "too many steps" in rows[0]["message"]
-    assert "expected a number greater than 0, found -1" in rows[2]["message"]
+    found = table(short_scene)
+    assert [row["status"] for row in found] == ["failed", "completed", "wrong input", "wrong input"]
+    assert "too many steps" in found[0]["message"]
+    assert "expected a number greater than 0, found -1" in found[2]["message"]
     ended = ffrobot("sweep", short_scene, "--vary", "analysis.inverse.max_steps=5", "-o", short_scene.with_name("none"))
     assert ended.returncode == 1
     assert "no run completed" in ended.stderr
@@ -91,10 +86,10 @@ def test_latin_hypercube(ffrobot, short_scene):
     text = short_scene.read_text(encoding="utf-8") + '\n[[payload]]\npoint = "rod.mid"\nmass = 0.1\n'
     short_scene.write_text(text, encoding="utf-8")
     ffrobot.ok("sweep", short_scene, *vary, "--sample", 4, "--seed", 7)
-    rows = table(short_scene)
-    decades = sorted(float(row["payload.0.mass"]) for row in rows)
+    found = table(short_scene)
+    decades = sorted(float(row["payload.0.mass"]) for row in found)
     assert all(0.01 * 100 ** (k / 4) <= mass < 0.01 * 100 ** ((k + 1) / 4) for k, mass in enumerate(decades))
-    assert prod(row["trajectory.slider.x"] in ("0.35", "0.3") for row in rows)
+    assert prod(row["trajectory.slider.x"] in ("0.35", "0.3") for row in found)
 
 
 @pytest.mark.parametrize(
@@ -132,14 +127,10 @@ def test_names_of_collected_datasets(ffrobot, short_scene):
 @pytest.mark.parametrize("column", ["", "[0]"])
 def test_what_outputs_miss_is_collected(ffrobot, tmp_path, column):
     """A force of 8 N m for 3 ms between outputs, borne by a motor at rest: its peak and RMS in closed form."""
-    rod = {"mass": 1.0, "inertia": 0.1, "center": [0.3, 0.0], "points": {"root": [0.0, 0.0]}}
-    scene = {
-        "name": "rod", "gravity": [0.0, 0.0], "body": [{"name": "arm", "rigid": rod}],
-        "joint": [{"name": "O", "type": "revolute", "between": ["ground", "arm.root"]}],
-        "trajectory": [{"name": "rest", "joint": "O", "value": "0"}],
-        "load": [{"joint": "O", "moment": "where(t < 0.5011, 0, where(t < 0.5041, 8, 0))"}],
-        "analysis": [{"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 0.1}],
-    }  # fmt: skip
+    run = {"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 0.1}
+    keys = {"gravity": (0.0, 0.0), "trajectory": [{"name": "rest", "joint": "O", "value": "0"}]}
+    keys["load"] = [{"joint": "O", "moment": "where(t < 0.5011, 0, where(t < 0.5041, 8, 0))"}]
+    scene = planar([{"name": "arm", "rigid": ROD}], [pin("O", "ground", "arm.root")], run, **keys)
     path, names = tmp_path / "scene.toml", [f"joints.O.moment{column}:{one}" for one in ("max", "rms")]
     path.write_text(tomli_w.dumps(scene))
     ffrobot.ok("sweep", path, "--vary", "body.arm.rigid.mass=1,2", *(w for name in names for w in ("--collect", name)))

@@ -1,6 +1,5 @@
 """Processes that perform the runs of sweeps one after the other: what a run does to its process is gone with it."""
 
-import csv
 import os
 import platform
 import signal
@@ -12,7 +11,9 @@ import h5py
 import numpy as np
 import pytest
 import tomli_w
+from datasets import datasets
 from loops import wheel
+from small_robots import rows
 
 import ffrobot
 from ffrobot.batch.worker import Done, Worker, own_worker
@@ -102,8 +103,7 @@ def sweep(ffrobot, scene):
         listed = ",".join(f'"{scene.parent}/mine.py:{name}"' for name in functions)
         vary = f"analysis.loop.controller.0.python={listed}"
         ffrobot.ok("sweep", scene, "--vary", vary, "--collect", "loop/joints/O/coordinate:last", "-j", 1, *options)
-        with (scene.with_suffix(".sweep") / "table.csv").open(encoding="utf-8") as file:
-            return list(csv.DictReader(file))
+        return rows(scene.with_suffix(".sweep") / "table.csv")
 
     return run
 
@@ -112,13 +112,6 @@ def notes(scene):
     """(worker, process, text) of every run that told."""
     lines = scene.with_name("notes.txt").read_text(encoding="utf-8").splitlines()
     return [(int(worker), int(process), text) for worker, process, text in (line.split(" ", 2) for line in lines)]
-
-
-def datasets(path):
-    with h5py.File(path) as file:
-        found = {}
-        file.visititems(lambda name, item: found.update({name: item[()]}) if isinstance(item, h5py.Dataset) else None)
-        return found
 
 
 def test_random_numbers_are_others_in_every_run(sweep, scene):
@@ -134,17 +127,18 @@ def test_results_are_those_of_single_runs(sweep, scene, ffrobot, tmp_path):
     run = scene.with_suffix(".sweep") / "runs" / "0001"
     single = tmp_path / "single.h5"
     ffrobot.ok("solve", run / "scene.toml", "-o", single, "--allow-python", scene.parent)
-    expected, found = datasets(single), datasets(run / "results.h5")
-    assert set(found) == set(expected)
-    assert len(expected) > 10
-    for name, values in expected.items():
-        np.testing.assert_array_equal(found[name], values, err_msg=name)
+    with h5py.File(single) as alone, h5py.File(run / "results.h5") as after:
+        expected, found = datasets(alone), datasets(after)
+        assert set(found) == set(expected)
+        assert len(expected) > 10
+        for name, values in expected.items():
+            np.testing.assert_array_equal(found[name], values, err_msg=name)
 
 
 def test_crashes_cost_their_own_run(sweep, scene):
-    rows = sweep("constant", "killed", "aborting", "constant")
-    assert [row["status"] for row in rows] == ["completed", "crashed", "crashed", "completed"]
-    assert [row["message"] for row in rows[1:3]] == ["ended by SIGKILL", "ended by SIGABRT"]
+    found = sweep("constant", "killed", "aborting", "constant")
+    assert [row["status"] for row in found] == ["completed", "crashed", "crashed", "completed"]
+    assert [row["message"] for row in found[1:3]] == ["ended by SIGKILL", "ended by SIGABRT"]
     assert len({worker for worker, _, _ in notes(scene)}) == 1
 
 

@@ -8,7 +8,9 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
+import tomli_w
 from rigid_robots import ROBOTS, with_motion
+from tables_3d import pin, planar
 
 from ffrobot import Results
 from ffrobot.exchange.export import export_file
@@ -81,44 +83,26 @@ def test_joint_trajectory_is_the_message(kind, request, ffrobot, tmp_path):
     assert ("no torque of a motor is known: effort is left empty" in done.stdout) == (not driven)
 
 
-@pytest.fixture(scope="module")
-def geared(tmp_path_factory, ffrobot):
-    """Results of an arm that sags behind a compliant gear, whose motor follows a path, with a rigid gear beyond."""
-    scene = tmp_path_factory.mktemp("geared") / "scene.toml"
-    scene.write_text(
-        """name = "geared"
-gravity = [0.0, -9.81]
-body = [
-  { name = "a", rigid = { mass = 2, inertia = 0.1, center = [0.4, 0.0], points = { root = [0, 0], tip = [0.8, 0] } } },
-  { name = "b", rigid = { mass = 0.1, inertia = 1e-3, center = [0.1, 0.0], points = { root = [0, 0] } } },
-]
-trajectory = [
-  { name = "t", motor = "hub", via = [0.0, 0.5], duration = 0.4 }, { name = "e", joint = "elbow", value = "t**3" },
-]
-initial = { state = "static" }
-analysis = [{ name = "run", kind = "pcid", end = 0.5, output_step = 0.05 }]
-[[joint]]
-name = "hub"
-type = "revolute"
-between = ["ground", "a.root"]
-gear_ratio = 50.0
-rotor_inertia = 1e-5
-stiffness = 2e3
-damping = 2.0
-[[joint]]
-name = "elbow"
-type = "revolute"
-between = ["a.tip", "b.root"]
-gear_ratio = 30.0
-rotor_inertia = 1e-5
-"""
-    )
+def test_the_side_of_a_compliant_gear_is_chosen(ffrobot, tmp_path):
+    """The path itself on the side of the motor, unless the other one is asked for; a table has both.
+
+    Of an arm that sags behind a compliant gear, whose motor follows a path, with a rigid gear beyond.
+    """
+    scene, geared = tmp_path / "scene.toml", tmp_path / "scene.results.h5"
+    a = {"mass": 2.0, "inertia": 0.1, "center": [0.4, 0.0], "points": {"root": [0.0, 0.0], "tip": [0.8, 0.0]}}
+    b = {"mass": 0.1, "inertia": 1e-3, "center": [0.1, 0.0], "points": {"root": [0.0, 0.0]}}
+    bodies = [{"name": name, "rigid": rigid} for name, rigid in (("a", a), ("b", b))]
+    joints = [
+        pin("hub", "ground", "a.root", gear_ratio=50.0, rotor_inertia=1e-5, stiffness=2e3, damping=2.0),
+        pin("elbow", "a.tip", "b.root", gear_ratio=30.0, rotor_inertia=1e-5),
+    ]
+    paths = [
+        {"name": "t", "motor": "hub", "via": [0.0, 0.5], "duration": 0.4},
+        {"name": "e", "joint": "elbow", "value": "t**3"},
+    ]
+    run = {"name": "run", "kind": "pcid", "end": 0.5, "output_step": 0.05}
+    scene.write_text(tomli_w.dumps(planar(bodies, joints, run, trajectory=paths, initial={"state": "static"})))
     ffrobot.ok("solve", scene)
-    return scene.with_suffix(".results.h5")
-
-
-def test_the_side_of_a_compliant_gear_is_chosen(geared, ffrobot, tmp_path):
-    """The path itself on the side of the motor, unless the other one is asked for; a table has both."""
     with h5py.File(geared) as file:
         target, joint = file["run/trajectories/t/target"][()], {k: v[()] for k, v in file["run/joints/hub"].items()}
         elbow = file["run/joints/elbow/coordinate"][()]

@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 from beam_links import circle, link_keys, rectangle, solid_link, tube
+from datasets import datasets
 
 import ffrobot
 
@@ -78,19 +79,13 @@ def in_other_units(keys, L, M, T):
 
 def numbers(keys):
     """All datasets of the body that a link file makes, and the families of its modes."""
-    found = {}
-
-    def take(name, item):
-        # Written for other programs from the rest; loads of stresses follow from the modes.
-        if isinstance(item, h5py.Dataset) and item.dtype.kind in "fi" and not name.startswith("craig_bampton"):
-            found[name] = np.asarray(item[()], dtype=np.float64)
-
     with h5py.File(ffrobot.make_link(keys).path) as file:
-        file.visititems(take)
-        families = [name.decode() for name in file["modes/family"][()]]
+        items = {name: np.asarray(item[()]) for name, item in datasets(file).items()}
+    # Written for other programs from the rest; loads of stresses follow from the modes.
+    others = {name for name in items if name.startswith("craig_bampton") or name.endswith("/static")}
+    found = {name: item for name, item in items.items() if item.dtype.kind in "fi" and name not in others}
     found["stations/EA"], found["stations/EI"] = found.pop("stations/rigidity").T
-    found = {name: values for name, values in found.items() if not name.endswith("/static")}
-    return found, families
+    return found, [name.decode() for name in items["modes/family"]]
 
 
 def unit_of(name, L, M, T):

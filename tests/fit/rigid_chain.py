@@ -1,9 +1,11 @@
 """A chain of rigid bodies on revolute joints with springs, in NumPy alone: linear equations about its equilibrium."""
 
 import numpy as np
+import tables_3d
 from scipy.spatial.transform import Rotation
+from tables_3d import X, Y, Z, revolute
 
-GRAVITY = np.array([0.0, 0.0, -9.81])
+GRAVITY = np.array(tables_3d.DOWN)
 
 
 class Joint:
@@ -82,20 +84,13 @@ def scene(chain, point, pose):
         rigid = {"mass": joint.mass, "center": joint.center.tolist(), "inertia": inertia, "points": points}
         bodies.append({"name": f"body{k}", "rigid": rigid})
         side = "ground" if k == 0 else f"body{k - 1}.end"
-        joints.append({
-            "name": joint.name, "type": "revolute", "between": [side, f"body{k}.origin"],
-            "axis": joint.axis.tolist(), "rotor_inertia": joint.rotor, "stiffness": joint.k, "damping": joint.d,
-            **({"at": joint.at.tolist()} if k == 0 else {}),
-        })  # fmt: skip
+        keys = {"rotor_inertia": joint.rotor, "stiffness": joint.k, "damping": joint.d}
+        keys |= {"at": joint.at.tolist()} if k == 0 else {}
+        joints.append(revolute(joint.name, side, f"body{k}.origin", joint.axis.tolist(), **keys))
     initial = {"joints": {joint.name: float(q) for joint, q in zip(chain, pose, strict=True)}}
-    rest = [{"name": "rest", "kind": "static"}]
-    return {
-        "name": "chain", "space": "spatial", "gravity": GRAVITY.tolist(), "body": bodies, "joint": joints,
-        "initial": initial, "analysis": rest,
-    }  # fmt: skip
+    return tables_3d.scene(bodies, joints, {"name": "rest", "kind": "static"}, initial=initial)
 
 
-X, Y, Z = np.eye(3).tolist()
 # A six-axis arm on a plate that tilts about x and y
 ARM = [
     Joint("tilt_x", [0.0, 0.0, 0.0], X, 4.0e6, 900.0, 20.0, [0.0, 0.0, 0.02], [0.4, 0.4, 0.7]),

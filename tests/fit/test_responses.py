@@ -11,6 +11,7 @@ from rigid_chain import ARM, TOOL, receptance, scene
 from scipy.io import savemat
 from scipy.linalg import eigh
 from scipy.optimize import brentq
+from tables_3d import joint, pin, planar
 
 import ffrobot
 from ffrobot.common.errors import InputError
@@ -127,30 +128,30 @@ def write_table(path, lines, columns):
 POSES = [[0.0, 0.0, 0.2, -0.4, 0.9, 0.3, 0.5, 0.1], [0.0, 0.0, -0.5, 0.1, 0.3, -0.4, 0.8, 0.2]]
 
 
-def robot_tests(folder, start, poses=POSES, lines=60):
-    """Files of the arm in `poses`, the last for validation, and of a scene with `start`."""
+def robot_tests(folder, start, lines=60):
+    """Files of the arm in `POSES`, the last for validation, and of a scene with `start`."""
     frequency, tests = np.linspace(3.0, 100.0, lines), []
-    for k, pose in enumerate(poses):
+    for k, pose in enumerate(POSES):
         H = receptance(ARM, np.array(pose), np.array(TOOL), frequency) * -((2 * np.pi * frequency[:, None, None]) ** 2)
         ends = {(f"tool/{'xyz'[j]}", f"tool/{'xyz'[i]}"): H[:, i, j] for i, j in np.ndindex(3, 3)}
         write_table(folder / f"pose{k}.csv", frequency, ends)
         joints = {joint.name: float(q) for joint, q in zip(ARM, pose, strict=True)}
         tests.append({
             "name": f"pose {k}", "file": f"pose{k}.csv", "unit": "m/s²/N", "points": {"tool": "body7.end"},
-            "pose": {"joints": joints}, "validation": 0 < k == len(poses) - 1,
+            "pose": {"joints": joints}, "validation": k == len(POSES) - 1,
         })  # fmt: skip
     (folder / "hammer.toml").write_text(tomli_w.dumps({"test": tests}))
-    (folder / "arm.toml").write_text(tomli_w.dumps(scene(start, TOOL, poses[0])))
+    (folder / "arm.toml").write_text(tomli_w.dumps(scene(start, TOOL, POSES[0])))
     return folder / "arm.toml", folder / "hammer.toml"
 
 
 def test_arm_assembled_in_numpy_is_found_again(tmp_path):
     """Springs and dampers of joints and of the plate below, to 1e-6; a pose that was not fitted has FRAC 1."""
     start, keys = copy.deepcopy(ARM), []
-    for joint, k, d in zip(start, (1.2, 0.85, 1.15, 0.9, 1.25, 0.8, 1.3, 0.75), (0.7, 1.3) * 4, strict=True):
-        if joint.name in ("tilt_x", "waist", "elbow", "pitch"):
-            joint.k, joint.d = k * joint.k, d * joint.d
-            keys += [f"joint.{joint.name}.stiffness", f"joint.{joint.name}.damping"]
+    for of, k, d in zip(start, (1.2, 0.85, 1.15, 0.9, 1.25, 0.8, 1.3, 0.75), (0.7, 1.3) * 4, strict=True):
+        if of.name in ("tilt_x", "waist", "elbow", "pitch"):
+            of.k, of.d = k * of.k, d * of.d
+            keys += [f"joint.{of.name}.stiffness", f"joint.{of.name}.damping"]
     fit = ffrobot.fit_responses(*robot_tests(tmp_path, start), keys)
     truth = [value for joint in ARM if f"joint.{joint.name}.damping" in keys for value in (joint.k, joint.d)]
     np.testing.assert_allclose(fit.value, truth, rtol=1e-6)
@@ -160,14 +161,6 @@ def test_arm_assembled_in_numpy_is_found_again(tmp_path):
     assert np.abs(fit.poses[1].frequency_error).max() < 1e-6
     joints = {joint["name"]: joint for joint in tomllib.loads((tmp_path / "arm.fitted.toml").read_text())["joint"]}
     assert joints["elbow"]["stiffness"] == pytest.approx(ARM[4].k, rel=1e-6)
-
-
-BEAM = """name = "beam"
-gravity = [0.0, 0.0]
-body = [{ name = "arm", link = "arm.toml" }]
-joint = [{ name = "clamp", type = "weld", between = ["ground", "arm.root"] }]
-analysis = [{ name = "rest", kind = "static" }]
-"""
 
 
 def test_modulus_and_damping_of_a_link_from_the_modes_of_a_clamped_beam(tmp_path):
@@ -185,7 +178,9 @@ def test_modulus_and_damping_of_a_link_from_the_modes_of_a_clamped_beam(tmp_path
     link = beam_link(L, tube(0.02, 0.016), 20, nu=None, name="arm", modes={"count": 6, "family": "in-plane-bending"})
     link["material"] = {"youngs_modulus": 60e9, "density": rho}
     (tmp_path / "arm.toml").write_text(tomli_w.dumps(link | {"damping": {"ratio": 0.004}}))
-    (tmp_path / "beam.toml").write_text(BEAM)
+    clamp, rest = joint("clamp", "weld", "ground", "arm.root"), {"name": "rest", "kind": "static"}
+    beam = planar([{"name": "arm", "link": "arm.toml"}], [clamp], rest, gravity=(0.0, 0.0))
+    (tmp_path / "beam.toml").write_text(tomli_w.dumps(beam))
     keys = ["links.arm.material.youngs_modulus", "links.arm.damping.ratio"]
     fit = ffrobot.fit_responses(tmp_path / "beam.toml", tmp_path / "tests.toml", keys)
     np.testing.assert_allclose(fit.value, [E, zeta], rtol=1e-4)  # elements and modes leave 1e-5
@@ -203,12 +198,9 @@ def arm_in_gravity(folder, stiffness, damping):
     (folder / "tests.toml").write_text(tomli_w.dumps({"test": tests}))
     points = {"root": [0.0, 0.0], "tip": [length, 0.0]}
     rigid = {"mass": mass, "center": [center, 0.0], "inertia": 0.3, "points": points}
-    joint = {"name": "a", "type": "revolute", "between": ["ground", "arm.root"], "rotor_inertia": 1e-3}
-    scene = {
-        "name": "arm", "gravity": [0.0, -9.81], "analysis": [{"name": "rest", "kind": "static"}],
-        "body": [{"name": "arm", "rigid": rigid}], "joint": [joint | {"stiffness": stiffness, "damping": damping}],
-    }  # fmt: skip
-    (folder / "arm.toml").write_text(tomli_w.dumps(scene))
+    hinge = pin("a", "ground", "arm.root", rotor_inertia=1e-3, stiffness=stiffness, damping=damping)
+    arm = planar([{"name": "arm", "rigid": rigid}], [hinge], {"name": "rest", "kind": "static"})
+    (folder / "arm.toml").write_text(tomli_w.dumps(arm))
     return folder / "arm.toml", folder / "tests.toml"
 
 

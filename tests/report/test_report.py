@@ -10,6 +10,8 @@ import h5py
 import numpy as np
 import pytest
 from beam_links import beam_link, tube
+from datasets import datasets
+from tables_3d import pin, planar
 
 import ffrobot
 from ffrobot.common.checksum import seal
@@ -100,7 +102,7 @@ def test_results_that_stopped_early_have_a_page(two_link, tmp_path):
     path = copy_of(two_link, tmp_path / "stopped.results.h5")
     with h5py.File(path, "r+") as file:
         del file["joints_only"]
-        for name, dataset in list(_datasets(file["forward"])):
+        for name, dataset in datasets(file["forward"]).items():
             values, about = dataset[:300], dict(dataset.attrs)
             del file["forward"][name]
             file["forward"][name] = values
@@ -111,12 +113,6 @@ def test_results_that_stopped_early_have_a_page(two_link, tmp_path):
     text = (tmp_path / "r.html").read_text(encoding="utf-8")
     assert ">interrupted</td>" in text
     assert '>0.299 of 1</td><td class="short">300</td>' in text
-
-
-def _datasets(group):
-    found = {}
-    group.visititems(lambda name, item: found.update({name: item}) if isinstance(item, h5py.Dataset) else None)
-    return found.items()
 
 
 def test_texts_of_a_scene_are_no_markup(two_link, tmp_path):
@@ -171,15 +167,11 @@ MODES = {"count": 2, "family": "in-plane-bending"}
 
 def test_what_moves_is_seen_first(tmp_path):
     """The page opens with the first analysis that goes through time; frames of `view` have the largest deflection."""
-    scene = ffrobot.make_scene(
-        name="swing", gravity=[0.0, -9.81],
-        body=[{"name": "arm", "link": beam_link(0.6, tube(0.02, 0.016), 4, nu=None, modes=MODES)}],
-        joint=[{"name": "O", "type": "revolute", "between": ["ground", "arm.root"]}],
-        trajectory=[{"name": "turn", "joint": "O", "value": "0.3*(1 - cos(6*t))"}],
-        analysis=[{"name": "rest", "kind": "static"},
-                  {"name": "swing", "kind": "pcid", "end": 1.0, "output_step": 0.01}],
-    )  # fmt: skip
-    with ffrobot.solve(scene, tmp_path / "swing.h5") as results:
+    arm = {"name": "arm", "link": beam_link(0.6, tube(0.02, 0.016), 4, nu=None, modes=MODES)}
+    run = {"name": "swing", "kind": "pcid", "end": 1.0, "output_step": 0.01}
+    path = {"name": "turn", "joint": "O", "value": "0.3*(1 - cos(6*t))"}
+    tables = planar([arm], [pin("O", "ground", "arm.root")], {"name": "rest", "kind": "static"}, run, trajectory=[path])
+    with ffrobot.solve(ffrobot.make_scene(**tables), tmp_path / "swing.h5") as results:
         sizes = np.linalg.norm(results["swing/points/arm.tip/deflection"], axis=1)
         frames = chosen_frames(results, "swing", 5)
         assert len(frames) == 5
