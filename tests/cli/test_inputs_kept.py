@@ -26,6 +26,7 @@ def folder(two_link_copy):
     [
         *((("link", "link1.toml", "--force"), name) for name in ("link1.toml", "soft.h5", "hard.h5", "scene.toml")),
         (("link", "link1.toml", "--force"), "notes.txt"),
+        (("link", "link1.toml"), "notes.txt"),
         (("link", "link1.toml"), "round"),
         *((("solve", "scene.toml"), name) for name in ("scene.toml", "link2.toml", "soft.h5", "hard.h5", "round")),
         (("sweep", "scene.toml", "--vary", "gravity.1=0"), "notes.txt"),

@@ -15,6 +15,7 @@ sys.argv = ["ffrobot", *sys.argv[1:]]
 from ffrobot.__main__ import main
 main()
 """
+OTHER_MPI = "libmpi.so.12: cannot open shared object file: No such file or directory"
 
 
 PART = link_keys("solid", 0.1, rectangle(0.01, 0.02), {"cell": "hexahedron"}, name="part", modes={"count": 2})
@@ -33,17 +34,22 @@ def test_without_gmsh(words, tmp_path):
     assert "gmsh" in done.stderr
 
 
-def test_finite_elements_that_cannot_be_loaded(tmp_path):
-    """As in an environment whose MPI is another one."""
-    (tmp_path / "dolfinx").mkdir()
-    error = "libmpi.so.12: cannot open shared object file: No such file or directory"
-    (tmp_path / "dolfinx" / "__init__.py").write_text(f"raise ImportError({error!r})")
+@pytest.mark.parametrize(
+    ("package", "error", "told"),
+    [
+        ("dolfinx", f"ImportError({OTHER_MPI!r})", OTHER_MPI),
+        ("petsc4py", "ModuleNotFoundError(name='petsc4py')", "petsc4py is not installed"),
+    ],
+)
+def test_finite_elements_that_cannot_be_loaded(tmp_path, package, error, told):
+    (tmp_path / package).mkdir()
+    (tmp_path / package / "__init__.py").write_text(f"raise {error}")
     (tmp_path / "arm.toml").write_text(tomli_w.dumps(PART))
     command = [sys.executable, "-m", "ffrobot", "link", "arm.toml"]
     environment = os.environ | {"PYTHONPATH": str(tmp_path)}
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, env=environment)
     assert (done.returncode, len(done.stderr.splitlines())) == (1, 1), done.stderr
-    assert f"arm.toml: computing this link needs the finite element libraries, and {error}" in done.stderr
+    assert f"arm.toml: computing this link needs the finite element libraries, and {told}" in done.stderr
 
 
 def test_figures_with_the_backend_of_a_notebook(tmp_path):

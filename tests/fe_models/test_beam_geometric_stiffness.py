@@ -32,9 +32,9 @@ position = 0.6
 PLACES = {"root": 0.0, "grip": 0.6, "tip": 0.8}
 
 
-def link_of(tmp_path, theory="euler-bernoulli", condition="cantilever", replace=("", "")):
+def link_of(tmp_path, theory="euler-bernoulli", condition="cantilever"):
     path = tmp_path / "rod.toml"
-    path.write_text(LINK.format(theory=theory, condition=condition).replace(*replace))
+    path.write_text(LINK.format(theory=theory, condition=condition))
     return read_link(path)
 
 

@@ -170,17 +170,6 @@ def test_points_outside_the_beam(link_file, section, point, message):
         read_link(path)
 
 
-@pytest.mark.parametrize(
-    ("ratio", "k1", "bound"),
-    # Timoshenko & Goodier, Theory of Elasticity, §109, table: J = k1 · long · short³
-    [(1.0, 0.1406, 3e-3), (1.5, 0.196, 3e-3), (2.0, 0.229, 3e-3), (3.0, 0.263, 3e-3), (10.0, 0.312, 3e-3),
-     (1e5, 1 / 3, 1e-5)],
-)  # fmt: skip
-def test_torsion_of_a_rectangle(ratio, k1, bound):
-    for section in (rectangle(ratio * 0.01, 0.01, 0.3), rectangle(0.01, ratio * 0.01, 0.3)):
-        assert section.torsion == pytest.approx(k1 * ratio * 1e-8, rel=bound)
-
-
 def test_rectangle():
     section = rectangle(0.015, 0.025, 0.3)
     assert section.I_yy == pytest.approx(0.025 * 0.015**3 / 12)

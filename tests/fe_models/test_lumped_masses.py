@@ -1,4 +1,4 @@
-"""Masses on interfaces: closed forms, a cloud of material points, and the same mass as a payload of stage 2."""
+"""Masses on interfaces: closed forms, and a cloud of material points."""
 
 import numpy as np
 import pytest
@@ -8,8 +8,6 @@ from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link import make_link
 from ffrobot.fe_models.modal_body import Interface
 from ffrobot.fe_models.modal_body.lumped_masses import Lump, attached_integrals, loads_with_lumps
-from ffrobot.mbs.model.body import from_modal_body
-from ffrobot.mbs.model.masses import with_payload
 
 EI, RHO_A, L = 2.068427e11 * 0.025 * 0.015**3 / 12, 7850.0 * 0.015 * 0.025, 1.0
 
@@ -113,33 +111,6 @@ def test_centrifugal_force_of_a_mass_stiffens_the_link_up_to_it(body):
             expected += w * N * np.outer(slope, slope)
     np.testing.assert_allclose(loaded.geometric_stiffness["omega_zz"], expected, rtol=1e-9)
     np.testing.assert_allclose(loaded.geometric_stiffness["omega_yy"], expected, rtol=1e-9)
-
-
-@pytest.mark.parametrize(("name", "position"), [("tip", None), ("grip", 0.4)])
-@pytest.mark.parametrize("inertia", [0.0, 0.01])
-def test_same_as_a_payload_of_stage_2(body, name, position, inertia):
-    """With all 40 modes of 20 elements both span the same motions; the modes differ in sign at most."""
-    bare = body(count=40, more=attached("grip", position=0.4))
-    loaded = from_modal_body("link", body(count=40, more=attached(name, 0.8, inertia, position)))
-    payload = with_payload(from_modal_body("link", bare), name, 0.8, np.zeros(3), np.diag([0.0, 0.0, inertia]))
-    low = slice(0, 10)
-    np.testing.assert_allclose(loaded.stiffness[low], payload.stiffness[low], rtol=1e-8)
-    assert loaded.mass == pytest.approx(payload.mass, rel=1e-12)
-    turning = [np.trace(each.second_moment[:2, :2]) for each in (loaded, payload)]
-    assert turning[0] == pytest.approx(turning[1], rel=1e-12)
-    np.testing.assert_allclose(loaded.first_moment, payload.first_moment, rtol=1e-12)
-    tips = loaded.points["tip"].rotation[2, low], payload.points["tip"].rotation[2, low]
-    sign = np.sign(tips[0] * tips[1])
-    np.testing.assert_allclose(loaded.S_bar[:, low], payload.S_bar[:, low] * sign, rtol=1e-6, atol=1e-8)
-    h, j = ([each.I_bar[0, 1] - each.I_bar[1, 0], each.I_bar[0, 0] + each.I_bar[1, 1]] for each in (loaded, payload))
-    for left, right in zip(h, j, strict=True):
-        np.testing.assert_allclose(left[low], right[low] * sign, rtol=1e-6, atol=1e-8)
-    in_plane, expected = (each.S_bar_kl[0, 0] + each.S_bar_kl[1, 1] for each in (loaded, payload))
-    rotation = payload.points[name].rotation[2]  # the file books all rotary inertia there, as in solids
-    expected = (expected + inertia * np.outer(rotation, rotation))[low, low] * np.outer(sign, sign)
-    np.testing.assert_allclose(in_plane[low, low], expected, atol=1e-7)
-    m_ff = np.einsum("kkmn->mn", loaded.S_bar_kl) + loaded.S_spin
-    np.testing.assert_allclose(m_ff, np.eye(len(m_ff)), atol=1e-10)
 
 
 @pytest.mark.parametrize(

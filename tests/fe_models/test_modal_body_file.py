@@ -95,30 +95,6 @@ def test_what_cannot_be_is_refused(outcome, changes, message):
         replace(full(outcome.body), **changes)
 
 
-def test_datasets_of_the_interface(outcome):
-    n = N
-    with h5py.File(outcome.path) as file:
-        assert file.attrs["format"] == "ffrobot-modal-body"
-        for name in ("format_version", "name", "kind", "reference_condition", "ffrobot_version", "input_hash"):
-            assert name in file.attrs
-        k = file["stations/position"].shape[0]
-        shapes = {
-            (): ("mass", "invariants/J_spin"),
-            (3,): ("first_moment", "interfaces/tip/position"),
-            (3, 3): ("second_moment",),
-            (n,): ("modes/frequency", "modes/damping_ratio", "modes/family", "invariants/h_spin"),
-            (n, n): ("modes/stiffness", "modes/mass", "invariants/S_spin", "geometric_stiffness/omega_zz"),
-            (3, n): ("invariants/S_bar", "interfaces/tip/translation", "interfaces/tip/rotation"),
-            (3, 3, n): ("invariants/I_bar",),
-            (3, 3, n, n): ("invariants/S_bar_kl",),
-            (k, 3, n): ("stations/translation", "stations/rotation"),
-            (k,): ("stations/height",),
-        }
-        for shape, names in shapes.items():
-            for name in names:
-                assert file[name].shape == shape, name
-
-
 def edited(path, edit):
     with h5py.File(path, "a") as file:
         edit(file)

@@ -3,27 +3,11 @@
 import gmsh
 import numpy as np
 import pytest
+from beam_links import solid_link
 from solids import body_of, write_solid
 
 import ffrobot
 from ffrobot.common.errors import InputError
-
-E, RHO = 2.0e11, 8000.0
-
-
-def halves(folder, E_outer=4 * E, rho_outer=4 * RHO, group="outer"):
-    """The body of a rod whose outer half has a material of its own, by name of its group."""
-    two_halves(folder / "halves.msh")
-    outer = {"youngs_modulus": E_outer, "poissons_ratio": 0.0, "density": rho_outer}
-    return ffrobot.make_link({
-        "name": "halves",
-        "material": {"youngs_modulus": E, "poissons_ratio": 0.0, "density": RHO},
-        "region": [{"group": group, "material": outer}],
-        "geometry": {"kind": "solid", "length": 1.0, "file": str(folder / "halves.msh")},
-        "mesh": {"order": 2},
-        "reference": {"condition": "cantilever"},
-        "modes": {"count": 2, "family": "axial", "attachment_modes": False},
-    }).body  # fmt: skip
 
 
 def orthotropic(E, nu, G):
@@ -59,8 +43,12 @@ def test_each_family_has_its_own_modulus(tmp_path):
 
 
 def test_a_region_that_is_not_in_the_mesh_is_refused(tmp_path):
+    two_halves(tmp_path / "halves.msh")
+    link = solid_link(1.0, None, {"order": 2}, name="halves", modes={"count": 2})
+    link["geometry"] = {"kind": "solid", "length": 1.0, "file": str(tmp_path / "halves.msh")}
+    link["region"] = [{"group": "outer_half", "material": link["material"]}]
     with pytest.raises(InputError, match=r"region.group: expected a volume group of the mesh \(inner, outer\), found"):
-        halves(tmp_path, group="outer_half")
+        ffrobot.make_link(link)
 
 
 def two_halves(path):

@@ -84,18 +84,6 @@ def test_square_section_bends_in_its_two_planes(tmp_path):
             assert u[1] < 1e-6 * u[2]
 
 
-def test_interface_masses_count_in_modes_and_integrals(tmp_path):
-    """A tip mass of a cantilever: mode 1 of the beam with tip mass μ m, 1 + cos cosh + μβ (cos sinh − sin cosh) = 0."""
-    mass = RHO * LENGTH * HEIGHT * WIDTH
-    more = f'[[interface]]\nname = "tip"\nmass = {mass}\n'
-    body = body_of(write_solid(tmp_path, condition="cantilever", count=2, more=more))
-    beta = 1.2479174  # root for μ = 1 (Blevins, Formulas for Natural Frequency, table 8-8)
-    omega = beta**2 * np.sqrt(2.068427e11 * HEIGHT**2 / 12 / RHO)
-    np.testing.assert_allclose(2 * np.pi * body.frequency[0], omega, rtol=0.003)  # 0.15 % of it the clamped root
-    np.testing.assert_allclose(body.mass, 2 * mass, rtol=1e-12)
-    np.testing.assert_allclose(body.first_moment[0], 1.5 * mass, rtol=1e-12)
-
-
 def test_more_modes_than_there_are(tmp_path):
     path = write_solid(tmp_path, cell="hexahedron", order=1, divisions=(1, 1, 1), family="all", count=100)
     with pytest.raises(InputError, match=r"modes.count: expected at most .* which has 18 "):

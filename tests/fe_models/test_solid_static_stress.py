@@ -1,24 +1,12 @@
-"""Static stresses under unit loads: solids against beams, and a bar with a hole against a plain solution and CalculiX.
-
-The plain solution has UFL forms, a clamped root and tractions on the tip, uniform and linear over it: of supports, unit
-loads and modes nothing is shared. Stresses are read off as the program does, which `test_solid_stress.py` checks.
-"""
+"""Static stresses under unit loads: solids against beams, and a bar with a hole against CalculiX."""
 
 import numpy as np
 import pytest
 import tomli_w
-import ufl
 from beam_links import beam_link, rectangle, solid_link
-from dolfinx import fem
-from dolfinx.fem import petsc as fem_petsc
-from mpi4py import MPI
-from petsc4py import PETSc
 
-from ffrobot.fe_models.link_file import read_link
 from ffrobot.fe_models.modal_body.unit_loads import unit_load_names, work_on_modes
 from ffrobot.fe_models.modal_body_file import read_modal_body
-from ffrobot.mesh.compat import function_space
-from ffrobot.mesh.solid_mesh import solid_mesh
 
 E, NU, RHO, L, H, B = 2.0e11, 0.3, 7800.0, 0.4, 0.06, 0.02
 LOADS = (
@@ -51,34 +39,6 @@ def bar(tmp_path_factory, ffrobot):
 def static(body, point, load):
     """(6,) stress at a point under a unit load."""
     return body.stress[point].static[:, body.stress_loads.index(load)]
-
-
-def clamped(path):
-    """Displacements (dofs, 2) of the bar, clamped at its root, under a force along y and a moment at its tip."""
-    link = read_link(path)
-    solid = solid_mesh(link.part(path))
-    space = function_space(solid.mesh, 2, (3,))
-    u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
-    mu, lambda_ = E / 2 / (1 + NU), E * NU / (1 + NU) / (1 - 2 * NU)
-    sigma = 2 * mu * ufl.sym(ufl.grad(u)) + lambda_ * ufl.div(u) * ufl.Identity(3)
-    root = fem.dirichletbc(np.zeros(3), fem.locate_dofs_geometrical(space, lambda x: np.isclose(x[0], 0.0)), space)
-    K = fem_petsc.assemble_matrix(fem.form(ufl.inner(sigma, ufl.sym(ufl.grad(v))) * ufl.dx), bcs=[root])
-    K.assemble()
-    tip = ufl.Measure("ds", domain=solid.mesh, subdomain_data=solid.facet_tags)(solid.part.faces["tip"])
-    y = ufl.SpatialCoordinate(solid.mesh)[1]
-    solver = PETSc.KSP().create(MPI.COMM_SELF)
-    solver.setOperators(K)
-    solver.setType(PETSc.KSP.Type.PREONLY)
-    solver.getPC().setType(PETSc.PC.Type.LU)
-    solver.getPC().setFactorSolverType("mumps")
-    found = []
-    for load in (v[1] / (H * B), -y * v[0] / (B * H**3 / 12)):
-        f = fem_petsc.assemble_vector(fem.form(load * tip))
-        fem_petsc.set_bc(f, [root])
-        x = f.duplicate()
-        solver.solve(f, x)
-        found.append(x.array.copy())
-    return space, np.stack(found, axis=1)
 
 
 def hole(place):

@@ -1,13 +1,17 @@
-"""Of stage 1 only that part is done again which depends on what changed."""
+"""Of stage 1 only that part is done again which depends on what changed; what is in the way, and signals."""
 
+import signal
 import subprocess
 import sys
 from dataclasses import replace
 
+import h5py
 import numpy as np
 import pytest
+from solids import write_solid
 
 from ffrobot.common.checksum import seal
+from ffrobot.common.errors import InputError
 from ffrobot.common.version import digest_of_code
 from ffrobot.fe_models.link import cached_modal_body, make_link, restated
 from ffrobot.fe_models.link_file import read_link
@@ -102,8 +106,6 @@ def test_the_cache_gives_modes_to_every_link_that_has_the_same(link_file, cache)
 
 
 def test_files_without_the_hash_of_their_modes_are_still_read(link_file, cache):
-    import h5py
-
     path = link_file()
     made = make_link(path).path
     with h5py.File(made, "r+") as file:
@@ -172,3 +174,34 @@ def test_a_kept_mesh_gives_the_same_modal_body_and_a_damaged_one_is_made_again(s
     assert "meshing" in lines
     assert kept_part(kept) is not None
     assert outcome.path.read_bytes() == quick
+
+
+def test_signals_end_the_process_as_ever(tmp_path):
+    """PETSc installs handlers that print pages and exit with its own code, unless told not to."""
+    path = write_solid(tmp_path, divisions=(2, 1, 1), family="all", count=1)
+    code = f"""
+import os, signal
+from pathlib import Path
+from ffrobot.fe_models.link import make_link
+make_link(Path({str(path)!r}), force=True)
+os.kill(os.getpid(), signal.SIGTERM)
+"""
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert result.returncode == -signal.SIGTERM
+    assert result.stderr == ""
+
+
+def test_another_file_in_the_way_is_kept(link_file, tmp_path):
+    """Of another kind than those of tests/cli/test_inputs_kept.py."""
+    with h5py.File(tmp_path / "results.h5", "w") as file:
+        file.attrs["format"] = "something else"
+    with pytest.raises(InputError, match=r"results\.h5: output"):
+        make_link(link_file(), tmp_path / "results.h5")
+
+
+def test_a_truncated_output_is_made_again(link_file):
+    path = link_file()
+    output = make_link(path).path
+    output.write_bytes(output.read_bytes()[:3000])
+    assert make_link(path).computed
+    assert not make_link(path).computed
