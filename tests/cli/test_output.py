@@ -4,8 +4,6 @@ import re
 import subprocess
 import sys
 
-import pytest
-
 FORBIDDEN = ("dolfinx", "gmsh", "petsc4py", "slepc4py", "mpi4py", "matplotlib", "scipy", "numpy.typing")
 
 
@@ -30,14 +28,12 @@ def test_summary(two_link):
     assert flat.endswith("scene.results.h5")
 
 
-@pytest.fixture
-def short_scene(two_link_copy, two_link):
-    """The folder of a short two-link scene; its modal bodies are in the cache since `two_link`."""
-    return two_link_copy({"scene.toml": {"end = 1.0": "end = 0.01"}})
+def test_stage_2_works_where_stage_1_is_not_installed(two_link_copy, two_link, ffrobot, tmp_path):
+    """A solve from modal files imports neither the finite element libraries nor what a start would wait for.
 
-
-def test_stage_2_works_where_stage_1_is_not_installed(short_scene, ffrobot, tmp_path):
-    """A solve from modal files imports neither the finite element libraries nor what a start would wait for."""
+    They are in the cache since `two_link`.
+    """
+    folder = two_link_copy({"scene.toml": {"end = 1.0": "end = 0.01"}})
     program = f"""
 import sys
 for name in {FORBIDDEN!r}:
@@ -47,7 +43,7 @@ from ffrobot.cli import main
 main()
 """
     done = subprocess.run(
-        [sys.executable, "-c", program], cwd=short_scene, env=ffrobot.environment, capture_output=True, text=True,
+        [sys.executable, "-c", program], cwd=folder, env=ffrobot.environment, capture_output=True, text=True,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "r.h5").exists()

@@ -25,14 +25,6 @@ def with_steps(keys, **of_analyses):
     return new
 
 
-@pytest.fixture
-def kept(tmp_path):
-    """The file of a planar run with its steps."""
-    path = tmp_path / "kept.h5"
-    with ffrobot.solve(ffrobot.make_scene(**with_steps(SCENE, keep_steps=True))) as results:
-        return results.save(path)
-
-
 def histories(results):
     names = ["inverse/joints/shoulder/moment", *(f"{name}/points/arm.tip/position" for name in results.analyses)]
     return np.hstack([results[name].reshape(len(results[name]), -1) for name in names])
@@ -63,7 +55,8 @@ def test_the_same_run_again(tmp_path, more):
         ({"repeat_steps": "kept.hdf"}, 'did you mean "kept.h5"?'),
     ],
 )
-def test_mistakes(write, kept, changes, message):
+def test_mistakes(write, tmp_path, changes, message):
+    ffrobot.solve(ffrobot.make_scene(**with_steps(SCENE, keep_steps=True)), tmp_path / "kept.h5").close()
     keys = SCENE | {"analysis": [SCENE["analysis"][0] | {"repeat_steps": "kept.h5"} | changes]}
     with pytest.raises(ffrobot.InputError) as told:
         ffrobot.solve(write(keys))

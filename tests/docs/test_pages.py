@@ -1,5 +1,7 @@
-"""Tutorial and how-to pages, run as a reader would: files saved, commands typed, Python entered, answers compared."""
+"""Pages and the notebook, run as a reader would: files saved, commands typed, Python entered, answers compared."""
 
+import base64
+import copy
 import doctest
 import os
 import re
@@ -15,6 +17,7 @@ from PIL import Image
 DOCS = Path(__file__).parents[2] / "docs"
 sys.path.insert(0, str(DOCS))
 
+from notebook import NOTEBOOK, PNG, read_notebook, run_notebook  # noqa: E402
 from palette import SAME, WIDEST, difference, pictures, reduced  # noqa: E402
 
 # What their commands do has tests of its own: studies, solids, resumed runs, paths, tracking, controllers, pictures.
@@ -120,3 +123,15 @@ def test_page_does_what_it_says(page, ffrobot, tmp_path, monkeypatch):
     reader.follow(text)
     assert reader.ran >= 3
     check_pictures(page, text, tmp_path)
+
+
+@pytest.mark.nightly
+def test_notebook_shows_what_its_cells_do(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shown = read_notebook()
+    for before, now in zip(shown["cells"], run_notebook(copy.deepcopy(shown))["cells"], strict=True):
+        for old, new in zip(before.get("outputs", []), now.get("outputs", []), strict=True):
+            assert old.get("text") == new.get("text"), f"run python docs/notebook.py ({NOTEBOOK})"
+            if "data" in old:
+                pictures = (base64.b64decode(output["data"][PNG]) for output in (old, new))
+                assert difference(*pictures) < SAME, f"run python docs/notebook.py ({NOTEBOOK})"

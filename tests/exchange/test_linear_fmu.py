@@ -82,16 +82,16 @@ class Robot:
     def running(self, kind=FMU2Slave):
         return running(self.description, self.unpacked, kind)
 
-    def simulate(self, kind, signals, step=STEP, **options):
-        """Outputs at steps, of inputs by name."""
-        time = step * np.arange(len(next(iter(signals.values()))))
+    def simulate(self, signals):
+        """Outputs of co-simulation at steps, of inputs by name."""
+        time = STEP * np.arange(len(next(iter(signals.values()))))
         table = np.zeros(len(time), dtype=[("time", float)] + [(name, float) for name in signals])
         table["time"] = time
         for name, values in signals.items():
             table[name] = values
         found = simulate_fmu(
-            str(self.path), fmi_type=kind, start_time=0.0, stop_time=time[-1], output_interval=step, input=table,
-            output=self.outputs, **options,
+            str(self.path), fmi_type="CoSimulation", start_time=0.0, stop_time=time[-1], output_interval=STEP,
+            input=table, output=self.outputs,
         )  # fmt: skip
         return np.array([found[name] for name in self.outputs]).T
 
@@ -106,8 +106,8 @@ class Robot:
         return lsim((model.A, model.B, model.C, model.D), u, time, interp=linear)[1] + felt @ model.D.T
 
 
-def signals(count=COUNT, step=STEP):
-    time = step * np.arange(count)
+def signals(count=COUNT):
+    time = STEP * np.arange(count)
     return {MOTOR: np.sin(7 * time), PATCH: 50 * np.cos(30 * time), FORCE: 0.3 * time}
 
 
@@ -169,7 +169,7 @@ def test_a_controller_commands_what_it_did_in_its_loop(ffrobot, folder):
 
 
 def test_co_simulation_holds_inputs(robot):
-    found = robot.simulate("CoSimulation", signals())
+    found = robot.simulate(signals())
     assert difference(found, robot.response(signals(), linear=False)) < EXACT
 
 
@@ -274,9 +274,7 @@ def test_without_a_compiler_there_are_sources(robot, ffrobot, tmp_path, monkeypa
     with zipfile.ZipFile(tmp_path / "sources.fmu") as file:
         assert sorted(file.namelist()) == ["modelDescription.xml", "sources/linear.c", "sources/model.h"]
     other = Robot(robot.folder, compiled(tmp_path / "sources.fmu"))
-    np.testing.assert_allclose(
-        other.simulate("CoSimulation", signals(20)), robot.simulate("CoSimulation", signals(20)), rtol=1e-9, atol=1e-15
-    )
+    np.testing.assert_allclose(other.simulate(signals(20)), robot.simulate(signals(20)), rtol=1e-9, atol=1e-15)
 
 
 def test_a_compiler_that_fails_is_told(robot, ffrobot, tmp_path, monkeypatch):

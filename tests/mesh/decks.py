@@ -53,14 +53,14 @@ def free(points, cells, card="CHEXA", cp=""):
     return text
 
 
-def fixed(points, cells, card="CHEXA", cp="", mark="", wide=False):
+def fixed(points, cells, card="CHEXA", mark="", wide=False):
     """Nastran in fixed field of 8 or 16 columns; lines go on with `mark`."""
     text = ""
     for k, (x, y, z) in enumerate(points):
         if wide:
-            text += f"{'GRID*':8}{k + 1:<16}{cp:<16}{x:<16.9g}{y:<16.9g}*\n{'*':8}{z:<16.9g}\n"
+            text += f"{'GRID*':8}{k + 1:<16}{'':<16}{x:<16.9g}{y:<16.9g}*\n{'*':8}{z:<16.9g}\n"
         else:
-            text += f"{'GRID':8}{k + 1:<8}{cp:<8}" + "".join(f"{value:<8.6f}"[:8] for value in (x, y, z)) + "\n"
+            text += f"{'GRID':8}{k + 1:<8}{'':<8}" + "".join(f"{value:<8.6f}"[:8] for value in (x, y, z)) + "\n"
     for k, cell in enumerate(cells):
         entries = [k + 1, 1, *(node + 1 for node in cell)]
         lines = [entries[at : at + 8] for at in range(0, len(entries), 8)]

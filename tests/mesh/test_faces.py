@@ -17,12 +17,12 @@ def fork(occ):
     occ.cut(joined, [(3, occ.addCylinder(x, 0, -50, 0, 0, 100, r)) for x, r in ((60, 20), (940, 15), (500, 22))])
 
 
-def bore(name, x, y=0.0):
-    return PlaceRecord(name=name, position=(x, y, 0.0), normal=(0.0, 0.0, 1.0))
-
-
 def at(name, position, normal):
     return PlaceRecord(name=name, position=position, normal=normal)
+
+
+def bore(name, x):
+    return at(name, (x, 0.0, 0.0), (0.0, 0.0, 1.0))
 
 
 def test_a_box_has_six_smooth_faces(solid, mesh_part):

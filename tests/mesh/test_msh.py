@@ -13,13 +13,12 @@ POINTS, CELLS = bar()
 LEFT = [(1, 2, 4, 3), (3, 4, 6, 5)]
 
 
-def version_2(cells, groups, kind=5, binary=False, names=((3, 8, "all"), (3, 9, "insert"), (2, 4, "left"))):
+def version_2(cells, groups, kind=5, binary=False):
     """A mesh of one elementary entity, with a physical group for each element, and two quadrilaterals at x = 0."""
     text = (
         b"$MeshFormat\n2.2 %d 8\n" % binary + (np.int32(1).tobytes() + b"\n" if binary else b"") + b"$EndMeshFormat\n"
     )
-    listed = "".join(f'{dim} {tag} "{name}"\n' for dim, tag, name in names)
-    text += f"$PhysicalNames\n{len(names)}\n{listed}$EndPhysicalNames\n".encode()
+    text += b'$PhysicalNames\n3\n3 8 "all"\n3 9 "insert"\n2 4 "left"\n$EndPhysicalNames\n'
     text += b"$Nodes\n%d\n" % len(POINTS)
     rows = [(3, 4, np.array(row) - 1) for row in LEFT] + list(zip([kind] * len(cells), groups, cells, strict=True))
     if binary:
