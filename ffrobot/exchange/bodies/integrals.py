@@ -137,14 +137,6 @@ def _with_agreed_masses(integrals: ShapeIntegrals) -> tuple[ShapeIntegrals, tupl
     In files of few digits M_e is off ∫ρΦᵀΦ. This replaces it where no section with inertia about x explains that.
     """
     M, translational = integrals.modal_mass, integrals.translational_mass
-    mean = np.sum(integrals.S_bar**2, axis=0) / integrals.mass
-    sizes = np.sqrt(np.abs(mean) / np.maximum(np.diag(M), 1e-300))
-    if sizes.max() > 1.0 + ROUNDED:
-        raise InputError(
-            "modal masses: expected at least those that the mean motion of the shapes has",
-            f"mode {sizes.argmax() + 1} whose shape moves the center of mass {sizes.max():.3g} times as far as its"
-            " modal mass allows. Shapes and modal masses of the file contradict each other",
-        )
     off = np.abs(M - translational).max() / max(np.abs(M).max(), 1e-300)
     if off <= EXACT or np.linalg.eigvalsh(integrals.about_center)[0] > EXACT * np.abs(integrals.inertia).max():
         return integrals, ()
