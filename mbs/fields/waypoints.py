@@ -128,6 +128,7 @@ class Recorded:
     place: Callable[[int], str]
     remarks: tuple[str, ...] = ()
     rates: Array | None = None
+    units: tuple[str, ...] = ()  # in the header
 
     def waypoints(self) -> Waypoints:
         """Return the rows as waypoints with remarks on odd entries; a row that repeats the one before is left out.
@@ -188,14 +189,15 @@ def load_record(path: Path) -> Recorded:
     if len(columns) > 2 and NANOSECONDS.fullmatch(columns[1]):
         times = times + 1e-9 * (table[:, 1] - (table[0, 1] if remarks else 0.0))
         columns, table = [columns[0], *columns[2:]], np.delete(table, 1, axis=1)
-    names, values = columns[1:], table[:, 1:]
+    names, values, units = columns[1:], table[:, 1:], list[str]()
     for k, name in enumerate(names):
-        unit = UNIT.fullmatch(name)
-        if unit is not None and (factor := FACTORS.get(unit[2] or unit[3])) is not None:
-            names[k], values[:, k] = unit[1], factor * values[:, k]
-            if factor != 1.0:
-                remarks.append(f'"{shown(name)}" is converted to {"m" if "m" in (unit[2] or unit[3]) else "rad"}')
-    return Recorded(names, times, values, lambda k: f"line {lines[k]}", tuple(remarks))
+        match = UNIT.fullmatch(name)
+        if match is not None and (unit := match[2] or match[3]) in FACTORS:
+            names[k], values[:, k] = match[1], FACTORS[unit] * values[:, k]
+            units.append(unit)
+            if FACTORS[unit] != 1.0:
+                remarks.append(f'"{shown(name)}" is converted to {"m" if "m" in unit else "rad"}')
+    return Recorded(names, times, values, lambda k: f"line {lines[k]}", tuple(remarks), units=tuple(units))
 
 
 def _seconds(header: str, times: Array) -> tuple[Array, list[str]]:

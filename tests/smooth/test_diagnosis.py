@@ -238,6 +238,7 @@ TWO = "0,0,0\n0.1,0.1,0.1\n0.2,0.2,0.2\n0.3,0.3,0.3\n"
         ("t,hip,ankle\n" + TWO, {}, 'found none of "knee" among "hip", "ankle"'),
         ("t,value\n0,0\n0.1,1\n0.2,2\n0.3,3\n", {}, 'found none of "hip", "knee"'),
         ("t,hip,knee\n0,0,0\n0.1,10,20\n0.2,20,40\n0.3,30,80\n", {}, "found \"hip\" from 0 to 30: --degrees"),
+        ("t,hip [deg],knee\n" + TWO, {"degrees": True}, '--degrees: expected a header without units, found "deg"'),
         ("t,hip,knee\n0,1,1\n0.1,1,1\n0.2,1,1\n0.3,1,1\n", {}, "expected joints that move, found none"),
         ("t,hip,knee\n0,0,0\n0,1,1\n0,2,1\n0.3,3,1\n", {}, "4 set points with times that increase, found 2"),
         ("t,hip,knee\n" + TWO, {"servo": {"hip": 20.0}}, 'of each of "hip", "knee", found none of "knee"'),
