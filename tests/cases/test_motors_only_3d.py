@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from drawn_arms import drawn_arm
+from beam_links import beam_link, rectangle
 from patched_arms import arm
-from rod_chain_3d import Body, RodChain, X, Y, Z, bar
-from scipy.interpolate import CubicSpline
+from tables_3d import pin, planar
 
 import ffrobot
 from ffrobot.run.solve import solve_scene
@@ -70,53 +69,18 @@ def test_leaning_arm_keeps_to_its_line(solved):
         assert bent[1:].min() > 5e-4
 
 
-@pytest.mark.nightly
-def test_moments_carry_an_arm_of_rods_along_the_same_line(solved):
-    """Rods and springs of another program: within what 1/(4 · 3²) of too much stiffness is of the deflections."""
-    axis = np.array([0.0, -1.0, 0.2]) / np.hypot(1.0, 0.2)
-    column = Body(np.zeros(3), Z, 4.0, 0.2 * Z, np.diag([0.06, 0.06, 0.02]))
-    upper = bar(0.5, 0.010, 0.014, 3, np.array([0.0, 0.1, 0.4]), -Y)
-    fore = bar(0.4, 0.008, 0.010, 3, 0.5 / 6 * X, axis, payload=0.2)
-    chain = RodChain([column, *upper, *fore], 0.4 / 6 * X, [0, 1, 1 + len(upper)])
-    file, names = solved("arm_3r_motors_only").file, ("waist", "shoulder", "elbow")
-    t = file["exact/time"][()]
-    t = t[t < 0.55]
-    found = np.array([file[f"exact/joints/{name}/moment"][: len(t)] for name in names]).T
-    guess = [file[f"exact/joints/{name}/coordinate"][0] for name in names]
-    target = file["exact/points/fore.tip/position"][: len(t)]
-    q, holding = chain.at_rest(target[0], guess)
-    np.testing.assert_allclose(holding, found[0], atol=1e-4)  # N·m of 2: the weight alone
-    moments = CubicSpline(t, found - found[0] + holding)
-    tip = chain.moved(moments, t, q, damping=0.0)
-    assert np.linalg.norm(tip - target, axis=1).max() < 0.15e-3
-
-
-@pytest.mark.parametrize(
-    ("seed", "stout"),
-    [(1, False), *(pytest.param(*of, marks=pytest.mark.nightly) for of in ((127, False), (129, False), (121, True)))],
-)
-def test_drawn_arms_follow_their_paths(seed, stout, tmp_path):
-    """Any axes, offsets and sections, undamped or not; places and orientations of the tool.
-
-    Zeros of arm 1 cross the imaginary axis; one of arms 121 and 127 passes through infinity, which leaves the ends with
-    one condition more or less than unknowns; arm 129 has six joints, and derivatives at rest do not lead to its motion.
-    """
-    path, tool = drawn_arm(seed, tmp_path, stout=stout)
-    with ffrobot.solve(path) as results:
-        for key in ("position", "quaternion"):
-            target, replayed = (results[f"{run}/points/{tool}/{key}"] for run in ("exact", "again"))
-            way = np.linalg.norm(target[-1] - target[0])
-            assert way > 0.03
-            assert np.linalg.norm(replayed - target, axis=1).max() < 2e-4 * way
-
-
-def test_arm_that_starts_next_to_a_singular_posture_is_told_so(tmp_path):
-    """Undeformed it reaches its start; at times on its path bent links need postures beyond the reach of its joints."""
-    path, _ = drawn_arm(126, tmp_path)
+def test_an_arm_that_starts_next_to_a_singular_posture_is_told_so():
+    """Undeformed it reaches its start, nearly stretched; bent links need postures beyond the reach of its joints."""
+    link = beam_link(0.4, rectangle(0.012, 0.02), 8, modes={"count": 2, "family": "in-plane-bending"})
+    path = {"name": "tip", "point": "b.tip", "x": f"0.8*cos(5e-4) - 0.05*({S})", "y": f"0.1*({S})"}
+    tables = planar(
+        [{"name": name, "link": link} for name in "ab"], [pin("O", "ground", "a.root"), pin("A", "a.tip", "b.root")],
+        EXACT, gravity=(0.0, 0.0), trajectory=[path], initial={"joints": {"O": -5e-4, "A": 1e-3}},
+    )  # fmt: skip
     with pytest.raises(
         ffrobot.SolveError, match=r"at t = [\d.]+ s: at t = 0 s nearly a singular posture.*Move the path"
     ):
-        ffrobot.solve(path)
+        ffrobot.solve(ffrobot.make_scene(**tables))
 
 
 class StopsAfter(Watcher):
