@@ -33,18 +33,6 @@ def arm(solved):
     return solved("arm_6r")
 
 
-def test_work_of_motors_is_the_energy_and_what_friction_takes(arm):
-    """Of links that are held straight, by Simpson's rule over the outputs, 5 ms apart: no vibrations, no sticking."""
-    group = arm.file["straight"]
-    t, power = group["time"][()], -group["energy/dissipated_power"][()]
-    for joint in JOINTS:
-        power += group[f"joints/{joint}/moment"][()] * group[f"joints/{joint}/rate"][()]
-    energy = sum(group[f"energy/{kind}"][()] for kind in ("kinetic", "strain", "gravitational"))
-    work = (t[1] - t[0]) / 3 * np.cumsum(power[:-2:2] + 4 * power[1:-1:2] + power[2::2])
-    change = energy[2::2] - energy[0]
-    np.testing.assert_allclose(change, work, rtol=0, atol=2e-6 * np.abs(change).max())
-
-
 def test_the_scene_is_what_import_makes(tmp_path, ffrobot):
     """Bodies, joints and link files: those of the command in the README, to the last letter."""
     files = {"upper_arm": CASE / "links" / "casting.toml", "forearm": CASE / "links" / "tube.toml"}

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from checkpoints import check_column, peak, readme_table, reference
+from checkpoints import CASES, check_column, peak, readme_table, reference
 
 RELATIVE = 1e-6  # of each quantity's peak
 ARM_RUNS = [("line", "static"), ("circle", "static"), ("circle", "undeformed")]  # the other one: test_scenes.py
@@ -79,3 +79,9 @@ def test_slider_moves_by_its_own_forces(slider_crank_3d):
     expected[:, 0] = -0.3 * 0.08 * 30**2 * np.sin(30 * group["time"][()])
     np.testing.assert_allclose(total, expected, rtol=0, atol=1e-8 * np.abs(total).max())
     assert np.abs(group["joints/guide/reaction"][:, 0]).max() < 1e-9 * np.abs(total).max()
+
+
+def test_solid_links_take_other_link_files_alone():
+    """Beams become solids without a change of the scene."""
+    beams, solids = ((CASES / name / "scene.toml").read_bytes() for name in ("two_link", "two_link_solid"))
+    assert beams == solids
