@@ -123,6 +123,12 @@ def test_slow_sampling_is_warned_of():
         ({"apply": "joints"}, 'expected the key "apply" only in kind = "forward", found kind = "closed-loop"'),
         ({"controller": [{"kind": "lqr", "time": 7.0}]}, "controller no. 1: time: expected at most .* ends, found 7.0"),
         ({"disturbance": [{"joint": "O", "moment": "1"}]}, "disturbances at points"),
+        ({"disturbance": [{"point": "w.rim", "force": "x"}]}, "force"),
+        ({"disturbance": [{"point": "w.rim", "y": "log(t - 1)"}]}, "disturbance no. 1: y"),
+        ({"sensor": [{"modal": "w"}]}, "expected a flexible body"),
+        ({"sensor": [{"joint": "O", "resolution": -1.0}]}, "resolution"),
+        ({"controller": [{"kind": "modal-velocity", "bodies": ["w"], "damping_ratio": 1.0}]}, "a body with patches"),
+        ({"actuation": "nothing"}, "actuation"),
     ],
 )
 def test_bad_keys_are_refused(keys, expected):

@@ -64,18 +64,6 @@ def test_equilibrium_is_where_static_starts_begin(name, tmp_path, ffrobot):
             assert not np.any(group[f"bodies/{name}/velocity"])
 
 
-def test_shape_with_which_motors_are_enough(tmp_path, ffrobot):
-    """Where the path has come to rest, shape = "static" asks nothing of patches, which straight links need there."""
-    change = ('kind = "pcid"', 'kind = "fcid"\nshape = "static"')
-    straight = '\n[[analysis]]\nname = "straight"\nkind = "fcid"\nshape = "zero"\nend = 0.6\noutput_step = 0.1\n'
-    with solved(ffrobot, write_scene("arm3_line_static", tmp_path, change, more=straight)) as file:
-        for body in ("upper", "fore"):
-            F_p, of_straight = (file[f"{name}/bodies/{body}/modal_force"][-1] for name in ("inverse", "straight"))
-            assert np.abs(of_straight).max() > 0.1
-            assert np.abs(F_p).max() < 1e-6 * np.abs(of_straight).max()
-            assert np.abs(file[f"inverse/bodies/{body}/modal"][-1]).max() > 0
-
-
 def forward_scene(folder):
     """Checkpoint arm3_forward: moments given to the motors, no path."""
     data = load("arm3_forward")

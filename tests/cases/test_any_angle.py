@@ -8,7 +8,6 @@ from scipy.spatial.transform import Rotation
 from tables_3d import ORIGIN, X, Z, joint, revolute, rigid, scene
 
 import ffrobot
-from ffrobot.exchange.urdf.robot import read_urdf
 from ffrobot.mbs.quantities.motion import node_of
 from ffrobot.mbs.quantities.validity import doubts
 from ffrobot.run.solve import solve_scene
@@ -172,21 +171,3 @@ def test_constraints_that_do_not_hold_are_told(what, unit):
         q[7, column] += off * (1.0 if what == "angle" else unit)
         broken = replace(result, run=replace(result.run, q=q))
         assert any('trajectory "t" is violated by' in text for text in broken.warnings) == is_told
-
-
-def test_degrees_in_a_urdf_are_told(tmp_path):
-    origin = '<origin xyz="0 0 1" rpy="0 0 90"/>'
-    inertial = (
-        f'<inertial>{origin}<mass value="1"/><inertia ixx="1" iyy="2" izz="2.5" ixy="0" ixz="0" iyz="0"/></inertial>'
-    )
-    joint = '<joint name="j" type="continuous"><parent link="a"/><child link="b"/>'
-    path = tmp_path / "r.urdf"
-    path.write_text(
-        f'<robot name="r"><link name="a"/><link name="b">{inertial}</link>{joint}{origin}</joint></robot>', "utf-8"
-    )
-    robot = read_urdf(path)
-    assert [text.partition(":")[0] for text in robot.remarks] == ['link "b"', 'joint "j"']
-    expected = Rotation.from_euler("z", 90.0).as_matrix()
-    np.testing.assert_allclose(robot.joints["j"].origin.place.C, expected, atol=1e-14)
-    J = robot.links["b"].inertial.inertia
-    np.testing.assert_allclose(J, expected @ np.diag([1, 2, 2.5]) @ expected.T, atol=1e-13)

@@ -8,7 +8,7 @@ import scenes_in_3d
 from checkpoint_scene_files import write_scene
 from scipy.integrate import simpson
 from scipy.spatial.transform import Rotation
-from tables_3d import ORIGIN, pin, planar, revolute, rigid, scene
+from tables_3d import ORIGIN, revolute, rigid, scene
 
 import ffrobot
 from ffrobot.common.errors import InputError
@@ -107,37 +107,6 @@ def test_least_torque_is_the_least_of_whole_motions():
     assert abs(b / (2 * a)) < 0.03
     with solve(arm(RUN | {"end": 0.4, "tolerance": 1e-7}, redundancy="least-motion")) as found:
         assert integral(found) > 1.001 * least
-
-
-def stretching(reach, redundancy, T=0.6, L=0.35):
-    """An arm of three bars whose tip goes to `reach` of their length in T."""
-    bar = {"mass": 1.5, "inertia": 0.02, "center": [L / 2, 0.0], "points": {"root": [0.0, 0.0], "tip": [L, 0.0]}}
-    start = dict(zip("ABC", (0.2, 0.9, -1.3), strict=True))
-    tip = L * np.exp(1j * np.cumsum(list(start.values()))).sum()
-    s = f"(10*(t/{T})**3 - 15*(t/{T})**4 + 6*(t/{T})**5)"
-    r, phi = f"({abs(tip)} + {3 * L * reach - abs(tip)}*{s})", f"({np.angle(tip)} + 0.3*{s})"
-    return planar(
-        [{"name": name, "rigid": bar} for name in "abc"],
-        [pin("A", "ground", "a.root"), pin("B", "a.tip", "b.root"), pin("C", "b.tip", "c.root")],
-        {"name": "inverse", "kind": "pcid", "end": T, "output_step": T / 100},
-        trajectory=[{"name": "tip", "point": "c.tip", "x": f"{r}*cos({phi})", "y": f"{r}*sin({phi})"}],
-        redundancy=redundancy, initial={"joints": start},
-    )  # fmt: skip
-
-
-@pytest.mark.parametrize(("reach", "least"), [(0.8, 165.51), (0.95, 189.04), (0.98, 196.14)])
-def test_least_torque_near_the_edge_of_reach(reach, least):
-    """At 0.95 by splines of a joint in place of those along what the path leaves free; others ended without an answer.
-
-    With more tip reach the least integral grows, and it stays below that of least motion.
-    """
-    sums = []
-    for criterion in ("least-torque", "least-motion"):
-        with solve(stretching(reach, criterion)) as found:
-            moments = np.stack([found[f"inverse/joints/{joint}/moment"] for joint in "ABC"])
-            sums.append(simpson(np.sum(moments**2, axis=0), x=found["inverse/time"]))
-    assert sums[0] == pytest.approx(least, rel=0.01)
-    assert sums[0] < 0.85 * sums[1]
 
 
 def test_freedom_that_nothing_settles_is_told_with_the_joints_that_move():

@@ -267,12 +267,3 @@ def test_a_mesh_that_is_too_coarse(scene, monkeypatch):
             assert all(f"up to {left[-1]:.2g} of the largest elastic one" in text for text in said)
     assert left[0] > 1e-4 > left[1]
     assert off[0] > 10 * off[1]
-
-
-@pytest.mark.nightly
-def test_patches_by_least_voltage(scene):
-    """Moments of patches that add no stiffness are proportional to their width: dV/dw = −V/w."""
-    path = scene(('kind = "tracking"', 'kind = "tracking"\nobjective = "least-voltage"'), alone=True)
-    found = ffrobot.sensitivity(path, ["peak pzt.arm.required_voltage"], ["pzt.0.width"])
-    ((entry,),) = found.entries
-    assert entry.derivative == pytest.approx(-next(iter(found.readings.values())).value / 0.02, rel=1e-3)
