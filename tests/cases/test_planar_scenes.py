@@ -11,15 +11,6 @@ import ffrobot
 from ffrobot.common.rotations import exponential
 from ffrobot.mbs.model import system
 
-NIGHTLY = (
-    "actuation points", "pieces under control",
-    "controllers",  # as behind gears, and of a loop
-    "patches",  # as those that stiffen, and of few modes
-    "limits of paths",  # as shapers
-    "compliant gears",  # as between frames
-    "geometric stiffening",  # as in a loop
-)  # fmt: skip
-
 ATTRIBUTES = ("status", "check_point", "check_modes", "check_error", "check_status")
 
 
@@ -37,7 +28,6 @@ def solved(tables, path, compared=COMPARED):
             name: item[()] for name, item in found.items()
             if isinstance(item, h5py.Dataset) and item.size and name.rpartition("/")[2] in compared
             and not ("/linear/" in name and not name.endswith("frequency"))
-            and not ("link1" in name and "actuation" in name)  # points of other components in the plane
         }  # fmt: skip
         for name, item in found.items():
             if name.endswith("/modal_transform") and item.shape[0] > item.shape[1]:  # fewer modes, of own coordinates
@@ -47,9 +37,7 @@ def solved(tables, path, compared=COMPARED):
         return about, numbers, {name: results.linear(name) for name in about if f"{name}/linear" in file}
 
 
-@pytest.mark.parametrize(
-    "feature", [pytest.param(name, marks=[pytest.mark.nightly] * (name in NIGHTLY)) for name in FEATURES]
-)
+@pytest.mark.parametrize("feature", FEATURES)
 def test_a_planar_scene_is_that_in_3d(feature, tmp_path, monkeypatch):
     """The equations in 3D are integrated as they are, without a projection on the plane in which the robot moves."""
     kind, tables, share = FEATURES[feature]
