@@ -110,25 +110,6 @@ def test_with_the_steps_of_the_inverse_run_round_off_is_all_that_is_left(solutio
     assert departure(inverse, back) < 1e-12
 
 
-@pytest.mark.parametrize("apply", ["joints+pzt", "trajectory"])
-@pytest.mark.parametrize("integrators", [("dop853", "dopri5"), ("radau", "radau"), ("dopri5", "dop853")])
-def test_with_other_steps_the_tolerance_is_left(solution, apply, integrators):
-    tolerance, (first, second) = 1e-7, integrators
-    inverse = inverse_of(solution.model, tolerance, integrator=first)
-    back = replay_of(solution.model, inverse, apply, tolerance, integrator=second)
-    assert departure(inverse, back) < tolerance
-
-
-def test_loads_that_jump(solution):
-    """Steps of both runs end where the load jumps."""
-    load = {"point": "b1.tip", "y": "where(t < 0.07, 0, 3)", "mx": "where(t < 0.11, 0.02, -0.03)"}
-    model = prepare_scene(scene([load]), Watcher()).model
-    inverse = inverse_of(model, 1e-6)
-    free = inverse_of(solution.model, 1e-6)
-    assert np.abs(inverse.q - free.q).max() > 1e-4
-    assert departure(inverse, replay_of(model, inverse, "joints+pzt", 1e-6)) < 1e-6
-
-
 @pytest.mark.parametrize("shape", ["zero", "static"])
 def test_a_prescribed_shape(solution, shape):
     """Links that ring in PCID keep it, held by forces on their modes."""

@@ -1,4 +1,4 @@
-"""Residual vibration and settling: closed forms of one axis with a compliant gear, final positions of all kinds."""
+"""Residual vibration and settling: closed forms of one axis with a compliant gear, and of a link that bends."""
 
 import csv
 
@@ -112,57 +112,27 @@ def test_residual_and_settling_are_responses(tmp_path, ffrobot):
             parse_response("residual b.top").read(results)
 
 
-def soft_arm(*kinds):
-    """An arm that hangs on a motor and bends under gravity by 20 mm; strongly damped, it is at rest at the end."""
-    link = beam_link(
-        0.6, rectangle(0.004, 0.02), 8, modes={"count": 2, "family": "in-plane-bending"}, damping={"ratio": 0.3}
-    )  # fmt: skip
-    inverse = {"kind": "pcid", "end": 3.0, "output_step": 0.01}
-    of_kind = {
-        "pcid": inverse,
-        "fcid": inverse | {"kind": "fcid", "shape": "static"},
-        "motors-only": inverse | {"kind": "motors-only"},
-        "closed-loop": {"kind": "closed-loop", "actuation": "pcid", "sample_time": 0.001, "controller": [
-            {"kind": "joint-pid", "proportional": {"hub": 400.0}, "derivative": {"hub": 40.0}}]},
-    }  # fmt: skip
+def soft_arm(path, *analyses, pieces=1, **tables):
+    """An arm on a motor, whose path takes keys."""
+    link = beam_link(0.6, rectangle(0.004, 0.02), 12, modes={"count": 3, "family": "in-plane-bending"})
     joint = {"name": "hub", "type": "revolute", "between": ["ground", "arm.root"], "gear_ratio": 100.0}
     return {
-        "name": "arm", "gravity": [0.0, -9.81], "body": [{"name": "arm", "link": link}],
-        "joint": [joint | {"rotor_inertia": 1e-3}], "payload": [{"point": "arm.tip", "mass": 0.1}],
-        "initial": {"state": "static"},
-        "trajectory": [{"name": "swing", "joint": "hub", "via": ["0*deg", "20*deg"], "duration": 0.4}],
-        "analysis": [{"name": kind, **of_kind[kind]} for kind in kinds],
-    }  # fmt: skip
-
-
-def test_robots_of_all_kinds_come_to_rest_at_their_final_position():
-    """The last output of a damped run is the equilibrium, which no kind reads off it; the path's end is not."""
-    with program.solve(program.make_scene(**soft_arm("pcid", "fcid", "motors-only", "closed-loop"))) as results:
-        for kind in results.analyses:
-            about = results.attributes(f"{kind}/settling/arm.tip")
-            assert about["at_end"] < 5e-6, kind
-            assert about["residual"] < 5e-6, kind
-            assert kind == "fcid" or about["at_path_end"] > 1e-3, kind
-        sag = results["pcid/points/arm.tip/deflection"][-1, 1]
-        assert sag < -5e-3
-        assert results.attributes("closed-loop/control")["residual"] < 5e-6
+        "name": "arm", "gravity": [0.0, 0.0], "body": [{"name": "arm", "link": link, "pieces": pieces}],
+        "joint": [joint | {"rotor_inertia": 1e-3}], "initial": {"state": "static"},
+        "trajectory": [{"name": "swing", "joint": "hub"} | path], "analysis": list(analyses),
+    } | tables  # fmt: skip
 
 
 @pytest.mark.parametrize("pieces", [1, 2])
 def test_a_turned_beam_rings_as_the_first_mode_of_a_cantilever_whole_or_in_pieces_or_replayed(pieces):
     """ω = β² √(E I/(ρ A L⁴)); the tip swings by 4 L/β² |∫ θ̇ e^{−iωt} dt|, β = 1.8751: ∫ x φ dx = 2 (L/β)², φ(L) = 2."""
-    tables, way, beta = soft_arm("pcid"), 0.02, 1.8751040687
-    tables["body"][0]["link"] = beam_link(
-        0.6, rectangle(0.004, 0.02), 12, modes={"count": 3, "family": "in-plane-bending"}
-    )  # fmt: skip
-    tables["body"][0]["pieces"] = pieces
-    tables["trajectory"][0] |= {"via": [0.0, way], "profile": "s-curve", "duration": 0.25}
-    replay = {"name": "forward", "kind": "forward", "actuation": "pcid", "apply": "joints"}
-    analyses = [*tables["analysis"], replay]
-    tables["analysis"] = [of | {"tolerance": 1e-6} | ({} if of is replay else {"end": 0.7}) for of in analyses]
+    way, beta = 0.02, 1.8751040687
+    inverse = {"name": "pcid", "kind": "pcid", "end": 0.7, "output_step": 0.01, "tolerance": 1e-6}
+    replay = {"name": "forward", "kind": "forward", "actuation": "pcid", "apply": "joints", "tolerance": 1e-6}
+    path = {"via": [0.0, way], "profile": "s-curve", "duration": 0.25}
     omega = (beta / 0.6) ** 2 * np.sqrt(70e9 / 2700 / 12) * 0.004
     expected = 2 * 4 * 0.6 / beta**2 * amplitude("s-curve", 0.25, omega) * way / WAY
-    with program.solve(program.make_scene(**tables | {"gravity": [0.0, 0.0], "payload": []})) as results:
+    with program.solve(program.make_scene(**soft_arm(path, inverse, replay, pieces=pieces))) as results:
         for kind in results.analyses:
             about = results.attributes(f"{kind}/settling/arm.tip")
             assert about["frequency"] == pytest.approx(omega / (2 * np.pi), rel=1e-4), kind
@@ -175,10 +145,9 @@ def test_a_turned_beam_rings_as_the_first_mode_of_a_cantilever_whole_or_in_piece
 @pytest.mark.parametrize("share", [0.95, 1.05])
 def test_nothing_vibrates_under_more_than_the_load_of_euler(share):
     """An upright link that is held straight: π² E I/(4 L²) at its tip is what it would carry without that."""
-    tables = soft_arm("fcid")
-    tables["analysis"][0] |= {"shape": "zero", "output_step": 0.1}
-    tables["trajectory"][0]["via"] = ["70*deg", "90*deg"]
+    straight = {"name": "fcid", "kind": "fcid", "shape": "zero", "end": 3.0, "output_step": 0.1}
     load = np.pi**2 * 70e9 * 0.02 * 0.004**3 / 12 / (4 * 0.6**2)
-    tables |= {"payload": [{"point": "arm.tip", "mass": share * load / 9.81}], "geometric_stiffening": True}
+    keys = {"payload": [{"point": "arm.tip", "mass": share * load / 9.81}], "geometric_stiffening": True}
+    tables = soft_arm({"via": ["70*deg", "90*deg"], "duration": 0.4}, straight, gravity=[0.0, -9.81], **keys)
     frequency = settled(tables, "fcid/settling/arm.tip")["frequency"]
     assert np.isnan(frequency) if share > 1 else 0 < frequency < 1
