@@ -53,15 +53,6 @@ def test_weighted_solutions_are_optimal(weights):
     assert np.all(gradient[~inside] * np.sign(V[~inside]) < 1e-9 * size)
 
 
-def test_warm_start_does_not_change_the_answer():
-    rng = np.random.default_rng(7)
-    Phi, limit = rng.standard_normal((10, 10)), np.full(10, 0.7)
-    F = history(rng, 200, 10, 3.0)
-    warm = allocation(Phi, limit).solve(F)
-    cold = np.vstack([allocation(Phi, limit).solve(f[None]) for f in F])
-    np.testing.assert_allclose(warm, cold, atol=1e-9)
-
-
 def test_within_the_limits_the_unlimited_solution_is_taken():
     rng = np.random.default_rng(8)
     Phi = rng.standard_normal((6, 9))

@@ -9,7 +9,6 @@ from beam_links import modal_body, paper_link
 from patches_on_links import layout, modes_in_the_plane, on_link, patches, planar_body
 
 from ffrobot.actuation.patches.link_patches import check_reach, link_patches
-from ffrobot.actuation.patches.patches import solve_voltages
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.modal_body import OutlinedPatches
 
@@ -20,29 +19,6 @@ C = 63e9 * 110e-12 * 0.025 * (0.75e-3 + 0.015) / 2  # Shabana 2022, Eq. 14
 def test_moment_per_volt(cantilever):
     np.testing.assert_allclose(patches(cantilever(10)).moment_per_volt, 1.364344e-3, rtol=1e-6)  # c of docs/theory.md
     np.testing.assert_allclose(patches(cantilever(10)).moment_per_volt, C, rtol=1e-12)
-
-
-def test_square_voltages_reproduce_the_modal_forces(cantilever):
-    array = patches(cantilever(10), limit=200.0)
-    F_p = np.random.default_rng(1).standard_normal((4, 10))
-    voltages = solve_voltages(array, F_p)
-    np.testing.assert_allclose(voltages.required @ array.Phi_V.T, F_p, atol=1e-9)
-    assert np.abs(voltages.within_limit).max() == 200.0
-    np.testing.assert_allclose(
-        voltages.residual, np.linalg.norm(F_p - voltages.within_limit @ array.Phi_V.T, axis=1), rtol=1e-12
-    )
-    assert array.condition_number == pytest.approx(np.linalg.cond(array.Phi_V))
-
-
-@pytest.mark.parametrize("count", [4, 14])
-def test_fewer_or_more_patches_than_modes_are_least_squares(cantilever, count):
-    array = patches(cantilever(10), count=count)
-    F_p = np.random.default_rng(2).standard_normal((1, 10))
-    voltages = solve_voltages(array, F_p)
-    left = F_p[0] - array.Phi_V @ voltages.required[0]
-    size = np.abs(array.Phi_V).max() * np.abs(F_p).max()
-    assert np.abs(array.Phi_V.T @ left).max() < 1e-9 * size  # no voltage can do better
-    assert voltages.residual[0] == pytest.approx(np.linalg.norm(left), abs=1e-9)
 
 
 def test_modes_that_no_patch_reaches_are_named():
