@@ -23,11 +23,11 @@ def link(name, E, condition, modes=8):
     )  # fmt: skip
 
 
-def pendulum(E, condition, **keys):
-    bodies = [{"name": name, "link": link(name, E, condition)} | keys.pop(name, {}) for name in ("link1", "link2")]
+def pendulum(E, condition):
+    bodies = [{"name": name, "link": link(name, E, condition)} for name in ("link1", "link2")]
     joints = [pin("O", "ground", "link1.root"), pin("A", "link1.tip", "link2.root")]
     fall = {"name": "fall", "kind": "forward", "end": 1.0, "output_step": 0.01, "tolerance": 1e-5}
-    return library.make_scene(**planar(bodies, joints, fall, **keys))
+    return library.make_scene(**planar(bodies, joints, fall))
 
 
 def solved(scene, path):
@@ -37,35 +37,14 @@ def solved(scene, path):
     return results, [str(one.message) for one in told if one.category is library.FfrobotWarning]
 
 
-def worst(results, key, analysis="fall"):
-    names = results.names(f"{analysis}/bodies")
-    return max(results.attributes(f"{analysis}/bodies/{name}")[key] for name in names)
-
-
-@pytest.mark.parametrize(
-    ("E", "condition"),
-    [*(pytest.param(E, "cantilever", marks=pytest.mark.nightly) for E in (2e10, 7e9)), (5e9, "simply-supported")],
-)
-def test_estimated_error_of_a_falling_pendulum(E, condition, tmp_path):
-    """Within 0.4 and 5 times the error, from 6e-4 to 9e-2 of the length; said from 1e-3 on at the latest."""
-    results, told = solved(pendulum(E, condition), tmp_path / "fall.h5")
-    error = np.abs(results["fall/points/link2.tip/position"] - falling_tip(E, 12, TIMES)).max()
-    estimate = worst(results, "position_error")
+def test_estimated_error_of_a_falling_pendulum(tmp_path):
+    """Within 0.4 and 5 times the error, of 9e-2 of the length, which is said."""
+    results, told = solved(pendulum(5e9, "simply-supported"), tmp_path / "fall.h5")
+    error = np.abs(results["fall/points/link2.tip/position"] - falling_tip(5e9, 12, TIMES)).max()
+    estimate = max(results.attributes(f"fall/bodies/{name}")["position_error"] for name in ("link1", "link2"))
     assert 0.4 * error < estimate < 5 * error
-    assert len(told) == 1 or error < 1e-3
+    assert len(told) == 1
     assert list(results.attributes("fall")["warnings"]) == [text.partition('"fall": ')[2] for text in told]
-
-
-@pytest.mark.nightly
-def test_stiffening_and_its_estimate(tmp_path):
-    """Three modes, which the present form bears: 6e-5 of the length and no warning, where 2e-2 was wrong without."""
-    keys = {name: {"modes": 3} for name in ("link1", "link2")}
-    scene = pendulum(7e9, "cantilever", geometric_stiffening=True, **keys)
-    results, told = solved(scene, tmp_path / "fall.h5")
-    error = np.abs(results["fall/points/link2.tip/position"] - falling_tip(7e9, 20, TIMES)).max()
-    assert error < 5e-4
-    assert worst(results, "position_error") < 5e-4
-    assert not told
 
 
 def elastica(load):

@@ -3,9 +3,7 @@
 Bounds are the aims of the project on a quiet machine; where the machine is busy the bare interpreter is slow as well.
 """
 
-import os
 import re
-import resource
 import statistics
 import subprocess
 import sys
@@ -99,32 +97,6 @@ def test_a_link_loads_nothing_of_scenes(tmp_path):
     found = loaded(f"sys.argv = {argv}\nfrom ffrobot.cli import main\nmain()")
     assert "ffrobot.fe_models.remarks" in found
     assert not [name for name in found if name.startswith(("ffrobot.mbs", "ffrobot.scene", "ffrobot.actuation"))]
-
-
-@pytest.mark.alone
-@pytest.mark.nightly
-def test_a_solve_costs_a_few_times_what_its_libraries_cost(ffrobot, tmp_path):
-    """Processor time, which other processes do not change; bytecode is kept, as pip does when it installs.
-
-    Measured: 2.0 times the libraries, which no cure reaches.
-    """
-    scene = tmp_path / "scene.toml"
-    scene.write_text(RIGID)
-    environment = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
-    environment["PYTHONPYCACHEPREFIX"] = str(tmp_path / "bytecode")
-
-    def cost(*command):
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=environment)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-
-    commands = (
-        (ffrobot.path, "solve", scene),
-        (sys.executable, "-c", "import numpy, h5py, pydantic, click; pydantic.BaseModel"),
-    )
-    (_, *solves), (_, *libraries) = zip(*((cost(*one) for one in commands) for _ in range(6)), strict=True)
-    assert min(solves) < 3 * min(libraries)
 
 
 def test_warnings_stay_warnings_where_links_are_computed():

@@ -12,6 +12,7 @@ import ffrobot
 from ffrobot.common.errors import InputError
 from ffrobot.common.rotations import exponential, logarithm, of_quaternion, of_rpy
 from ffrobot.mbs.fields.paths import Impulse, impulses, law_in, law_peak
+from ffrobot.run.fastest import least_stretch
 
 RUN = {"name": "inverse", "kind": "pcid", "end": 0.5, "output_step": 0.002, "tolerance": 1e-10}
 
@@ -54,6 +55,33 @@ def test_fastest_rigid_arm_takes_its_limit(limit):
     assert exact <= found * (1 + 1e-4)  # a peak lies between outputs
     assert found <= 1.0051 * exact
     assert np.abs(results["inverse/joints/shoulder/moment"]).max() <= limit * (1 + 1e-9)
+
+
+def test_limits_of_the_path_hold_for_the_fastest_motion():
+    """Motors that are strong enough leave the path as it is."""
+    results = ffrobot.solve(arm({"speed": 1.0, "acceleration": 5.0, "fastest": True}, {"moment_limit": 100.0}, end=3.0))
+    assert results.attributes("inverse/trajectories/swing")["stretch"] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("joint", "end", "says"),
+    [
+        ({}, 2.0, "expected limits of motors"),
+        ({"moment_limit": 0.05}, 2.0, 'end = 2 s of "inverse", found motor shoulder, with required/available ='),
+        ({"moment_limit": 0.05}, 0.4, "expected a path that is over before"),
+    ],
+)
+def test_what_cannot_be_made_faster_says_so(joint, end, says):
+    with pytest.raises(InputError, match=says):
+        ffrobot.solve(arm({"speed": 4.0, "acceleration": 40.0, "fastest": True}, joint, end))
+
+
+@pytest.mark.parametrize("limit", [0.013, 0.4, 1.0, 7.7])
+def test_least_stretch_is_found_from_both_sides(limit):
+    tried = []
+    found = least_stretch(lambda stretch: tried.append(stretch) or stretch >= limit, 0.01, 10.0)
+    assert limit <= found <= 1.005 * limit
+    assert len(tried) < 22
 
 
 def test_shapers_know_the_robot():
