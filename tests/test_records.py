@@ -133,10 +133,6 @@ MISTAKES = {
         put("joint", stiffness=100.0),
         "expected a rotor_inertia above 0 with stiffness, found none",
     ),
-    "load on a joint with two coordinates": (
-        add("load", joint="wrist", moment="1.0"),
-        'load no. 2: moment: expected 2 expressions, one for each coordinate of "wrist" .rad, rad., found 1',
-    ),
     "nothing to follow": (lambda data: data.pop("trajectory"), r"expected at least one \\[\\[trajectory\\]\\]"),
 }
 

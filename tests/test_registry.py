@@ -149,10 +149,10 @@ def rod(n, length):
     return {"mass": 2.0, "inertia": inertia, "center": [length / 2] + [0.0] * (n - 1), "points": points}
 
 
-def mechanism(n, **changed):
+def mechanism(n):
     axis = {"axis": [0.0, 0.0, 1.0]} if n == 3 else {}
     along = [1.0] + [0.0] * (n - 1)
-    slot = {"name": "S", "type": "slot", "between": ["arm.root", "crank.tip"], "axis": along} | changed
+    slot = {"name": "S", "type": "slot", "between": ["arm.root", "crank.tip"], "axis": along}
     return ffrobot.make_scene(
         name="quick return", space={2: "planar", 3: "spatial"}[n], gravity=[0.0] * n,
         body=[{"name": "crank", "rigid": rod(n, r)}, {"name": "arm", "rigid": rod(n, 1.0)}],
@@ -180,13 +180,6 @@ for n in (2, 3):
     power = (0.1 + 2.0 * 0.5**2) * rate * acceleration
     np.testing.assert_allclose(results["inverse/joints/O/moment"] * w, power, atol=1e-7 * np.abs(power).max())
 
-for n, line in ((2, "axis: expected at most 2 entries, found [1.0, 0.0, 0.0]"), (3, "axis: expected a list of 3")):
-    try:
-        mechanism(n, axis=[1.0, 0.0, 0.0][: 5 - n])
-    except ffrobot.InputError as error:
-        assert f'joint "S": {line}' in str(error), error
-    else:
-        raise AssertionError(n)
 assert {"SlotJoint", "SlotJointInPlane"} <= set(schema("scene")["$defs"])
 """
 

@@ -9,7 +9,7 @@ from patches_on_links import SCENE, patched
 
 from ffrobot.actuation.feasibility import judge_patches
 from ffrobot.actuation.patches.link_patches import check_reach, link_patches
-from ffrobot.actuation.patches.records import PztLayout, fibre_lamina, plain_lamina
+from ffrobot.actuation.patches.records import PztLayout, plain_lamina
 from ffrobot.common.errors import InputError
 from ffrobot.common.validation import validate
 from ffrobot.fe_models.beam.section_stress import surface_shear
@@ -111,16 +111,6 @@ def classical(angle):
     C = Q_bar[np.ix_(kept, kept)] - reduce @ Q_bar[np.ix_(out, kept)]
     held = Q_bar @ free
     return C, held[kept] - reduce[:, 0] * held[1]
-
-
-@pytest.mark.parametrize("angle", [-0.7, 0.0, 0.3, np.pi / 4, 1.2])
-def test_layer_of_fibres_at_an_angle(angle):
-    symbols = ("E_1", "E_2", "G_12", "nu_12", "d33", "d31", "spacing")
-    keys = ("modulus", "modulus_across", "shear_modulus", "poissons_ratio", "d33", "d31", "electrode_spacing")
-    found = fibre_lamina(angle=angle, **{symbol: FIBRES[key] for symbol, key in zip(symbols, keys, strict=True)})
-    C, per_volt = classical(angle)
-    np.testing.assert_allclose(found.C, C, rtol=1e-12, atol=1e-3)
-    np.testing.assert_allclose(found.per_volt, per_volt, rtol=1e-12, atol=1e-9 * np.abs(per_volt).max())
 
 
 def test_ceramic_held_across_in_compliances():

@@ -7,9 +7,9 @@ SEVEN = {"indices": [1, 2, 3, 4, 5, 6, 7], "family": "all"}
 TWO_IN_EACH_PLANE = {"count": 2, "family": ["in-plane-bending", "out-of-plane-bending"]}
 
 
-def link(modes, height=0.006, width=0.012):
-    section, modes = rectangle(height, width), modes | {"attachment_modes": False}
-    return {"name": "link", "link": beam_link(0.4, section, 4, modes=modes, damping={"ratio": 0.01})}
+def link(modes):
+    modes = modes | {"attachment_modes": False}
+    return {"name": "link", "link": beam_link(0.4, rectangle(0.006, 0.012), 4, modes=modes, damping={"ratio": 0.01})}
 
 
 def pzt(name, bends, **keys):

@@ -2,7 +2,6 @@
 
 import tomllib
 
-import numpy as np
 import tomli_w
 
 from ffrobot.mbs.fields.spelling import NORMAL, inertia_about_z, place
@@ -57,8 +56,3 @@ def write(tables, path):
     """A scene file."""
     path.write_text(tomli_w.dumps(tables), encoding="utf-8")
     return path
-
-
-def close(found, expected, share, least=1e-9):
-    """To a share of the peak, which is `least` at the least."""
-    np.testing.assert_allclose(found, expected, rtol=0, atol=share * max(np.abs(expected).max(), least))

@@ -34,11 +34,3 @@ def test_voltages(request, motors, name):
     rows = [i for i, value in enumerate(VOLTAGES["motors"]) if value == motors]
     times = np.array([float(VOLTAGES["t"][i]) for i in rows])
     check_column(case, "inverse", name, times, [VOLTAGES[name][i] for i in rows], RELATIVE["two_link"])
-
-
-def test_frame_motors_leave_link_1_to_its_motor(two_link, frame_motors):
-    """The moments are those of the other definition; only the patches of link 1 have nothing left to do."""
-    for joint in ("O", "A"):
-        a, b = (case.file[f"inverse/joints/{joint}/moment"][()] for case in (two_link, frame_motors))
-        np.testing.assert_allclose(a, b, rtol=0, atol=1e-6 * np.abs(a).max())
-    assert np.abs(frame_motors.file["inverse/pzt/link1/required_voltage"]).max() < 1e-3
