@@ -95,6 +95,7 @@ def test_unstable_gains_are_reported_and_the_results_kept():
     results = Results.from_image(results_image(solution), scene.path)
     assert results.has("wild/control/commands")
     assert results.attributes("calm/control")["verdict"] == "stable"
+    assert results.verdict["calm"].margins.startswith("margins (linear model): gains may grow")
     assert len(results.time("calm/control/commands")) == len(results["calm/control/readings"]) == 50
     (figure,) = [figure for figure in standard_figures(results) if figure.name == "tip_error"]
     assert [curve.label for curve in figure.curves] == ["wild", "calm"]

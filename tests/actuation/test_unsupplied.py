@@ -7,7 +7,7 @@ from links import quintic
 
 import ffrobot as library
 from ffrobot.actuation import feasibility
-from ffrobot.mbs.quantities.motion import plane_angle, section_motion
+from ffrobot.mbs.quantities.motion import section_motion
 from ffrobot.run.solve import solve_scene
 
 GEARED = {"gear_ratio": 80.0, "rotor_inertia": 2e-5}
@@ -104,16 +104,6 @@ def test_angles_kept():
     late = error[len(error) // 2 :]
     assert late.mean() == pytest.approx(about.angles_kept, rel=0.1)
     assert error.max() < 1.5 * about.angles_kept
-
-
-def test_sag_at_the_start():
-    """The equilibrium with the joint angles of t = 0 held, solved for by itself."""
-    solution = one()
-    angle = float(plane_angle(solution.analyses["inverse"].run, "link1")[0])
-    held = [{"name": "still", "joint": "J1", "value": f"{angle!r}"}]
-    static = solve_scene(chain((0.8,), (0.012,), (-0.2,), 0.5, {}, held, [{"name": "inverse", "kind": "static"}]))
-    tips = [section_motion(s.analyses["inverse"].run, "link1.tip").r[0] for s in (solution, static)]
-    assert np.linalg.norm(tips[1] - tips[0]) == pytest.approx(found(solution).at_start, rel=0.01)
 
 
 def test_what_is_said(tmp_path):

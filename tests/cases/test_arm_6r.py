@@ -2,7 +2,6 @@
 
 import json
 import re
-import runpy
 import subprocess
 import sys
 import tomllib
@@ -83,13 +82,6 @@ def deviations(group):
     return way[0], way.max(), way[-1], turn.max()
 
 
-@pytest.mark.parametrize("analysis", ["straight", "inverse"])
-def test_the_tool_is_on_its_path(arm, analysis):
-    way, turn = deviation(arm.file[analysis])
-    assert way.max() < 1e-6
-    assert turn.max() < 1e-6
-
-
 def test_straight_links_need_the_moments_of_a_rigid_robot(arm):
     """Newton and Euler on the URDF, the part in the gripper, friction of <dynamics>; accelerations by differences.
 
@@ -127,26 +119,6 @@ def after_path(group):
     """Times (T,) and places (T, 3) of the tool, mm, once the motors stand still."""
     late = group["time"][()] >= group["trajectories/waist"].attrs["end"]
     return group["time"][late], 1e3 * group["points/flange.tool/position"][late]
-
-
-def test_twists_at_rest_are_moments_over_stiffness(behind_gears):
-    """At the start, in equilibrium: τ = k (θ_m − γ); motors are where the path has them."""
-    for joint, (stiffness, *_) in runpy.run_path(str(CASE / "behind_gears.py"))["GEARS"].items():
-        entry = behind_gears["gears"][f"joints/{joint}"]
-        twist = entry["motor_angle"][0] - entry["coordinate"][0]
-        assert stiffness * twist == pytest.approx(entry["moment"][0], rel=1e-6, abs=1e-4)
-
-
-def test_the_shaper_is_for_the_frequency_with_which_the_tool_swings(behind_gears):
-    """Zero crossings of the fastest direction of swing, about those along the path."""
-    t, place = after_path(behind_gears["slower"])
-    swing = place - place.mean(axis=0)
-    along = swing @ np.linalg.svd(swing)[2][0]
-    rises = np.flatnonzero((along[1:] > 0) & (along[:-1] <= 0))
-    crossings = t[rises] - along[rises] * np.diff(t)[rises] / np.diff(along)[rises]
-    frequency = (len(crossings) - 1) / (crossings[-1] - crossings[0])
-    lowest, second = behind_gears["shaped"]["trajectories/waist"].attrs["shaper_frequency"]
-    assert 0.93 * lowest < frequency < 1.07 * second  # means along the path, over which they change by 7 %
 
 
 def test_numbers_behind_gears(behind_gears):

@@ -27,10 +27,16 @@ def solved(tables, path=None):
 
 def test_feasibility_of_a_scene_in_3d(tmp_path, ffrobot):
     with solved(one_link(), tmp_path / "results.h5") as results:
-        done, verdict = ffrobot.ok("feasibility", results.path), results.verdict["inverse"]
-    assert "yaw 1" in done.stdout  # motors of a universal joint, one for each axis
-    for name in ("one", "other"):
-        assert f"\n{name} " in done.stdout
+        lines, verdict = ffrobot.ok("feasibility", results.path).stdout.splitlines(), results.verdict["inverse"]
+        factors, modes = (
+            [float(x) for name in ("one", "other") for x in results[f"inverse/feasibility/pzt/{name}/{key}"]]
+            for key in ("factor", "mode_factor")
+        )
+    assert any(line.startswith("yaw 1") for line in lines)  # motors of a universal joint, one for each axis
+    patches = [line for line in lines if line.startswith("patch ")]
+    assert [line.endswith("no") for line in patches] == [factor > 1 for factor in factors]
+    assert sum(line.startswith("mode ") for line in lines) == len(modes)
+    assert sum(line.startswith("sufficient alone: a limit of") for line in lines) == 2
     assert set(verdict.patches) == {"one", "other"}
     assert verdict.feasible == all(need.factor <= 1.0 for need in verdict.patches.values())
 

@@ -174,20 +174,6 @@ def test_replay_follows_the_path(robot):
     assert about["without_patches"] > 100 * off
 
 
-@pytest.mark.parametrize(("robot", "error"), [("solid", 2e-4), ("loop", 1e-6), ("3D, stiffening", 1e-5)])
-def test_replay_stays_within_a_path_tolerance(robot, error):
-    """And on its planned path, within a hundredth of the tolerance."""
-    tables = ROBOTS[robot]()
-    tables["analysis"][0]["path_tolerance"] = error
-    with ffrobot.solve(ffrobot.make_scene(**tables)) as results:
-        point = tables["trajectory"][0]["point"]
-        planned, found = (results[f"{name}/points/{point}/position"] for name in ("carried", "replay"))
-        assert np.abs(results["carried/trajectories/tip/error"]).max() < error * (1 + 1e-6)
-        assert np.abs(found - planned).max() < 1e-2 * error
-        about = results.attributes("carried/tracking")
-    assert about["tolerance_price"] > 0.0
-
-
 def behind_a_gear(objective, moment_limit):
     """The strip behind its gear, whose path jumps in the fourth derivative where it begins and ends."""
     tables = geared(in_plane(patches("arm", 0.02, limit=200.0)), 20, hub=0.05)
