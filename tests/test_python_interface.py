@@ -114,9 +114,6 @@ def test_link_made_of_a_dictionary(folder, tmp_path):
     ("changes", "complaint"),
     [
         ({"body": [{"name": "arm", "link": 3}]}, 'body "arm": link: expected the name of a link file in quotes or a t'),
-        ({"gravitas": 1.0}, 'gravitas: expected one of the keys .*did you mean "gravity"'),
-        ({"gravity": "down"}, 'gravity: expected a list, found "down"'),
-        ({"body": [{"name": "arm", "link": "absent.toml"}]}, 'body "arm": link: expected an existing file'),
         ({"gravity": [0.0, 1j]}, "expected numbers, text, lists and tables"),
         ({"analysis": None}, "analysis: expected a value, since this key is required"),
     ],
