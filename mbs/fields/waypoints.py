@@ -150,7 +150,7 @@ class Recorded:
         if len(times) < 2:
             raise InputError("expected at least 2 waypoints", len(times))
         remarks += [*_jumps(self.columns, times, values), *_gaps(times, np.any(np.diff(values, axis=0), axis=1))]
-        return Waypoints(tuple(self.columns), times, values, (*remarks, *_moving_ends(times, values)))
+        return Waypoints(tuple(self.columns), times, values, (*remarks, *_moving_ends(self.columns, times, values)))
 
 
 def column_of(columns: Sequence[str], joint: str) -> int | None:
@@ -262,8 +262,8 @@ def _jumps(columns: Sequence[str], times: Array, values: Array) -> Iterator[str]
             )
 
 
-def _moving_ends(times: Array, values: Array) -> Iterator[str]:
-    """Remarks on a record that moves at an end, by a cubic through four rows there: its spline rests there."""
+def _moving_ends(columns: Sequence[str], times: Array, values: Array) -> Iterator[str]:
+    """Remarks on a column that moves at an end, by a cubic through four rows there: its spline rests there."""
     if len(times) < MANY:
         return
     steps, accelerations = np.diff(times)[:, None], _accelerations(times, values)
@@ -271,10 +271,10 @@ def _moving_ends(times: Array, values: Array) -> Iterator[str]:
         rates = np.abs(np.polyfit((times[ends] - at) / step, values[ends], 3)[-2]) / step
         abrupt = rates / step > ABRUPT * accelerations.max(axis=0)
         if abrupt.any():
-            rate = rates[abrupt].max()
+            k = int((rates * abrupt).argmax())
             yield (
-                f"rows move at t = {at:g} s by {rate:.3g} per s: the path is at rest there, and changes to that speed"
-                f" within {step:.3g} s"
+                f"{shown(columns[k])} moves at t = {at:g} s by {rates[k]:.3g} per s: the path is at rest there, and"
+                f" changes to that speed within {step:.3g} s"
             )
 
 

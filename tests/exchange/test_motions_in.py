@@ -148,7 +148,8 @@ def test_rows_twice_and_gaps(tmp_path):
         "path.csv: line 11: 1 rows that repeat the one before count once",
         "path.csv: no rows between t = 0.39 and 5 s, where others are 0.01 s apart: the path there is the spline's"
         " alone",
-        "path.csv: rows move at t = 0 s by 2 per s: the path is at rest there, and changes to that speed within 0.01 s",
+        "path.csv: value moves at t = 0 s by 2 per s: the path is at rest there, and changes to that speed within"
+        " 0.01 s",
     )
     with pytest.raises(InputError, match=r"line 3: expected times that increase, found t = 0 after 0"):
         load_waypoints(write(tmp_path / "path.csv", "t,value", [(0, 1), (0, 2)]))
