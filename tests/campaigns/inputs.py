@@ -1,8 +1,8 @@
-"""URDF, its meshes, motions, tables, HDF5, SID, .fem files, arguments of studies, one change each: refused, or taken.
+"""URDF, meshes, motions, tables, HDF5, SID, .fem files, arguments of studies, one change each: refused, or taken.
 
     python tests/campaigns/inputs.py [--count 100] [--seed 0] [--kind KIND …] [--record]
 
-Kinds are urdf, skin, motion, bag, csv, modal, results, bytes, sid, fem, study, catalog and controller.
+Kinds are urdf, skin, mesh, motion, bag, csv, modal, results, bytes, sid, fem, study, catalog and controller.
 
 Run by hand, some 0.3 s each. Attributes, cells and datasets get values of other types, huge, tiny, not finite, empty,
 names that lead elsewhere, and text that programs would run: a file CANARY must not appear, nor anything beside the
@@ -18,14 +18,19 @@ from collections import Counter
 from pathlib import Path
 from xml.etree import ElementTree
 
+sys.path.append(str(Path(__file__).parents[1] / "mesh"))
+import gmsh
 import h5py
+import meshio
 import numpy as np
 import trimesh
-from forked_command import BAD, load_once, outcome, run
+from decks import bar, elements, fixed, free, nodes, tetrahedra
+from forked_command import BAD, outcome, run
 from hostile import Damage
 from record import options, record
 
 from ffrobot.common.checksum import seal
+from ffrobot.mesh.gmsh_session import gmsh_session
 
 ROOT = Path(__file__).parents[2]
 ROBOTS = ROOT / "tests" / "exchange" / "robots"
@@ -44,6 +49,13 @@ geometry = { kind = "beam", length = 0.6, section = { shape = "tube", outer = 0.
 mesh = { elements = 10 }
 reference = { condition = "cantilever" }
 modes = { count = 3, family = "in-plane-bending" }
+"""
+PART = """
+name = "part"
+material = {{ youngs_modulus = 70e9, poissons_ratio = 0.33, density = 2700.0 }}
+geometry = {{ kind = "solid", length = 1.0, file = "{}" }}
+reference = {{ condition = "cantilever" }}
+modes = {{ count = 1, attachment_modes = false }}
 """
 SCENE = """
 name = "arm"
@@ -106,7 +118,22 @@ class Campaign:
         for form, name in (("joint-trajectory", "motion.json"), ("rosbag2", "bag")):
             code, told = run(["export", "scene.results.h5", "--format", form, "-o", name], self.ready)
             assert code == 0, told
-        self.damage = Damage(self.draw, b'import os; os.system("touch CANARY")\n')
+        self.parts()
+        self.damage = Damage(self.draw, b'import os; os.system("touch CANARY")\nSystemCall "touch CANARY";\n')
+
+    def parts(self) -> None:
+        """A bar as meshes in all formats, and in STEP."""
+        points, cells = bar()
+        tets = tetrahedra(cells)
+        (self.ready / "mesh.inp").write_text(nodes(points) + elements(tets, "C3D4"))
+        (self.ready / "mesh.bdf").write_text(free(points, cells))
+        (self.ready / "mesh.nas").write_text(fixed(points, tets, "CTETRA", wide=True))
+        for ending, keys in (("vtk", {}), ("vtu", {}), ("med", {}), ("msh", {}), ("xdmf", {"data_format": "XML"})):
+            meshio.Mesh(points, [("tetra", tets)]).write(self.ready / f"mesh.{ending}", **keys)
+        with gmsh_session():
+            gmsh.model.occ.addBox(0, -0.1, -0.05, 1, 0.2, 0.1)
+            gmsh.model.occ.synchronize()
+            gmsh.write(str(self.ready / "mesh.step"))
 
     def one(self, kind: str, number: int) -> None:
         shutil.rmtree(self.place.parent, ignore_errors=True)
@@ -149,6 +176,14 @@ class Campaign:
         (self.place / "robot.urdf").write_text(robot)
         commands = [["import", "robot.urdf", "-o", "out", *(["--density", "1000"] if filled else [])]]
         return f"{name} {label}", "robot.urdf", commands
+
+    def mesh(self):
+        """Of a part, beside options for gmsh."""
+        path = self.draw.choice(sorted(self.place.glob("mesh.*")))
+        label = self.of_bytes(path)
+        path.with_name(f"{path.name}.opt").write_bytes(self.damage.script)
+        (self.place / "part.toml").write_text(PART.format(path.name), encoding="utf-8")
+        return f"{path.name} {label}", path.name, [["link", "part.toml"]]
 
     def motion(self):
         return self.of_bytes(self.place / "motion.json"), "motion.json", [["import", "motion.json", "-o", "m.csv"]]
@@ -277,7 +312,8 @@ class Campaign:
 
 
 KINDS = (
-    "urdf", "skin", "motion", "bag", "csv", "modal", "results", "bytes", "sid", "fem", "study", "catalog", "controller",
+    "urdf", "skin", "mesh", "motion", "bag", "csv", "modal", "results", "bytes", "sid", "fem", "study", "catalog",
+    "controller",
 )  # fmt: skip
 
 
@@ -286,7 +322,6 @@ def main() -> None:
     parser = options(__doc__, count=100, seed=0)
     parser.add_argument("--kind", action="append", choices=KINDS, help="only this one; repeatable")
     asked = parser.parse_args()
-    load_once()
     kinds = asked.kind or KINDS
     with tempfile.TemporaryDirectory() as folder:
         campaign = Campaign(Path(folder), asked.seed)
