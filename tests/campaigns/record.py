@@ -2,9 +2,9 @@
 
 A campaign (a script in this folder, run by hand with seeds of its own) takes an option `--record` and ends with
 
-    record("meshes", tried="231 single changes of a bar …", found="0 × traceback, …")
+    record("inputs", tried="300 changed files and arguments", found="bag: rejected 27, …")
 
-Counts belong into both texts. The table of the page then takes it in with `python tests/campaigns/table.py`, which
+Counts belong into both texts. The table of the page then takes it in with `python tests/campaigns/record.py`, which
 reads all files in `records/`; both are committed. A campaign of several parts has a name for each: "tolerance-radau".
 """
 
@@ -29,6 +29,8 @@ def options(doc: str, **defaults: object) -> argparse.ArgumentParser:
 
 
 RECORDS = HERE / "records"
+PAGE = HERE.parents[1] / "docs" / "developer" / "stress_tests.md"
+HEAD = "| tried | found | command | when |\n|---|---|---|---|\n"
 
 
 def record(name: str, *, tried: str, found: str) -> None:
@@ -46,3 +48,14 @@ def record(name: str, *, tried: str, found: str) -> None:
     }
     RECORDS.mkdir(exist_ok=True)
     (RECORDS / f"{name}.json").write_text(json.dumps(entry, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def with_campaigns(page: str) -> str:
+    """The text of the page, its last table made of the records."""
+    records = (json.loads(path.read_text(encoding="utf-8")) for path in sorted(RECORDS.glob("*.json")))
+    rows = ("| {tried} | {found} | `{command}` | {when} |\n".format(**record) for record in records)
+    return page[: page.index(HEAD)] + HEAD + "".join(rows)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(with_campaigns(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

@@ -5,7 +5,8 @@
 Robots that are in the file already are not run again. Each is run by every integrator at random tolerances. Errors are
 differences to a run at 1e-10, in parts of the history's peak and in tolerances. Histories smaller than a thousandth of
 the largest of their kind count in parts of that. Modal velocities count relative to √m times the velocity of their
-body where that is larger than their own peak, rates of joints to 0.01 rad in the time of the run.
+body where that is larger than their own peak, rates of joints to 0.01 rad in the time of the run. Histories are arrays
+(T,) or (T, columns) by kind and by name.
 """
 
 import json
@@ -15,7 +16,6 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from judging import largest_errors, nothing_of_rounding, peaks, record_of_run, with_body_velocity, with_slow_rates
 from random_robots import random_scene
 from record import options, record
 from robots_3d import random_scene_in_3d
@@ -44,6 +44,9 @@ RUNS = {
 }
 MOST_RADIANS = 1_500.0  # of the highest vibration in a planar run: keeps it short
 MOST_STEPS = 100_000
+NEGLIGIBLE = 1e-3  # of the largest peak of a kind
+NOTHING = 1e-9  # modal forces over forces
+SLOW = 0.01  # rad in the time of a run: what the rate of a joint counts relative to at least
 KINDS = {
     "bodies": ("position", "angle", "modal", "modal_velocity", "modal_force"),
     "points": ("position", "deflection"),
@@ -51,6 +54,57 @@ KINDS = {
     "trajectories": ("force", "moment"),
     "pzt": ("required_voltage",),
 }
+
+
+def largest(values):
+    return float(np.abs(values).max())
+
+
+def peaks(exact):
+    """What the error of each history counts relative to: its peak, or a share of the largest of its kind."""
+    found = {}
+    for kind, members in exact.items():
+        of = {name: largest(values) for name, values in members.items()}
+        found[kind] = {name: max(peak, NEGLIGIBLE * max(of.values())) for name, peak in of.items()}
+    return found
+
+
+def with_body_velocity(own, mass, fastest):
+    """What modal velocities count relative to, whose own peak that is, on a body that moves by `fastest` (m/s)."""
+    return max(own, float(np.sqrt(mass)) * fastest)
+
+
+def with_slow_rates(rates, duration):
+    return {name: max(peak, SLOW / duration) for name, peak in rates.items()}
+
+
+def nothing_of_rounding(scale, kinds, forces):
+    """Sets to zero what only rounding leaves of modal forces where motors alone do it."""
+    if max(scale.get(kinds[0], {}).values(), default=0.0) < NOTHING * forces:
+        for kind in kinds:
+            scale[kind] = dict.fromkeys(scale.get(kind, {}), 0.0)
+
+
+def largest_errors(found, exact, scale):
+    """By kind, the largest error at any output, in parts of `scale`, and which history it is of."""
+    errors = {}
+    for kind, members in exact.items():
+        of = {
+            name: largest(found[kind][name] - values) / scale[kind][name]
+            for name, values in members.items()
+            if scale[kind][name] > 0
+        }
+        if of:
+            errors[kind] = max((error, name) for name, error in of.items())
+    return errors
+
+
+def record_of_run(asked, ran, tolerance, status, evaluations, errors):
+    """One run of a robot; errors(), of runs that are completed, counts in tolerances here."""
+    run = {"integrator": asked, "ran": ran, "tolerance": tolerance, "status": status, "evaluations": int(evaluations)}
+    if status == "completed":
+        run["errors"] = {kind: (float(f"{error / tolerance:.3g}"), name) for kind, (error, name) in errors().items()}
+    return run
 
 
 def planar_scene(seed, number, analyses):

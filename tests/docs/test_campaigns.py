@@ -1,12 +1,12 @@
 """The table of campaigns is what their records make of it; deliberate faults stand in today's source."""
 
 from faults import FAULTS, ROOT
-from table import PAGE, with_campaigns
+from record import PAGE, with_campaigns
 
 
 def test_the_page_is_current():
     page = PAGE.read_text(encoding="utf-8")
-    assert with_campaigns(page) == page, "python tests/campaigns/table.py"
+    assert with_campaigns(page) == page, "python tests/campaigns/record.py"
 
 
 def test_faults_are_in_the_source_once():

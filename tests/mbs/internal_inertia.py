@@ -26,32 +26,22 @@ class Modes:
 
 
 class Chain:
-    """Links (length, height, width) one behind the other in the plane, or a rod on waist and shoulder in 3D."""
+    """Links (length, height, width) one behind the other in the plane, without gravity."""
 
-    def __init__(self, links, count, payload, output, *, is_3d=False, gravity=0.0, E=70e9, rho=2700.0, rotor=None):
+    def __init__(self, links, count, payload, output, *, E=70e9, rho=2700.0, rotor=None):
         """`rotor`: inertia (kg·m²) and gear ratio at the joint of the second of two links, on the tip of the first."""
-        self.links, self.output, self.is_3d, self.gravity, self.rotor = links, output, is_3d, gravity, rotor
+        self.links, self.output, self.rotor = links, output, rotor
         self.modes, self.count = Modes(count, np.append(POINTS, 1.0)), count
-        planes = 2 if is_3d else 1
-        self.joints = len(output(0.0))
         masses = [rho * L * h * w for L, h, w in links]
         self.masses = np.concatenate([np.append(m * WEIGHTS, 0.0) for m in masses])
         self.masses[-1] = payload
-        self.omega = np.concatenate(
-            [np.tile(self.modes.roots**2 * np.sqrt(E * h * h / 12 / rho) / L**2, planes) for L, h, _ in links]
-        )
-        self.sizes = np.concatenate([np.full(planes * count, 1 / np.sqrt(m)) for m in masses])
+        self.omega = np.concatenate([self.modes.roots**2 * np.sqrt(E * h * h / 12 / rho) / L**2 for L, h, _ in links])
+        self.sizes = np.repeat(1 / np.sqrt(masses), count)
 
     def points(self, q, p):
-        """Of all masses (points, 2 or 3); the last one is the tip."""
+        """Of all masses (points, 2); the last one is the tip."""
         amplitudes = (p * self.sizes).reshape(len(self.links), -1, self.count)
-        x = np.append(POINTS, 1.0)
-        if self.is_3d:
-            (v, w), L = amplitudes[0] @ self.modes.shapes, self.links[0][0]
-            (cw, sw), (cs, ss) = ((np.cos(a), np.sin(a)) for a in q)
-            ahead, up = L * x * cs - w * ss, 0.2 + L * x * ss + w * cs
-            return np.column_stack([ahead * cw - v * sw, ahead * sw + v * cw, up])
-        found, root, angle = [], 0j, 0.0
+        x, found, root, angle = np.append(POINTS, 1.0), [], 0j, 0.0
         for (L, *_), (of,), turn in zip(self.links, amplitudes, q, strict=True):
             angle += turn
             at = root + np.exp(1j * angle) * (L * x + 1j * (of @ self.modes.shapes))
@@ -61,7 +51,7 @@ class Chain:
         return np.column_stack([at.real, at.imag])
 
     def jacobian(self, q, p, count=None):
-        """(points, 2 or 3, joints + modes), or of the first `count` of these."""
+        """(points, 2, joints + modes), or of the first `count` of these."""
         x = np.concatenate([q, p])
         steps = STEP * np.concatenate([np.ones(len(q)), 1 / self.sizes])
         split = len(q)
@@ -76,7 +66,7 @@ class Chain:
     def angles(self, t, p, q):
         """Joint angles of the path at t (s) by Newton's method from q, with deflections p."""
         wanted = self.output(t)
-        rows = slice(3 - len(wanted), 3) if self.is_3d else slice(2 - len(wanted), 2)
+        rows = slice(2 - len(wanted), 2)
         while True:
             off = wanted - self.points(q, p)[-1, rows]
             if np.abs(off).max() < 1e-13:
@@ -101,7 +91,6 @@ class Chain:
             q = self.angles(t, p, q)
             around = [self.points(self.angles(t + s * h, p, q), p) for s in (-1, 0, 1)]
             acceleration = (around[0] - 2 * around[1] + around[2]) / h**2
-            acceleration[:, -1] += self.gravity
             J = self.jacobian(q, p)
             p = -np.einsum("i,ijp,ij->p", self.masses, J[:, :, len(q) :], acceleration) / self.omega**2
         M = np.einsum("i,ija,ijb->ab", self.masses, J, J)

@@ -6,12 +6,11 @@ Many more robots, others each time: tests/campaigns/tolerance.py.
 import h5py
 import pytest
 from beam_links import beam_link, rectangle, tube
-from judging import largest_errors
 from links import ANGLES, TIP, arm, arm_links
 from mechanisms import relative
 from robots import inverse
 from tables_3d import pin, planar
-from tolerance import histories, scales, try_robot
+from tolerance import histories, largest_errors, scales, try_robot
 
 import ffrobot
 
