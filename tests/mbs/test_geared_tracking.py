@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from patch_sets import amplifiers
-from test_tracking import arm, strip_scene
+from test_tracking import strip_scene
 from tracked_arms import own_changes, random_arm
 
 import ffrobot
@@ -34,11 +34,10 @@ pytestmark = pytest.mark.filterwarnings("ignore::ffrobot.FfrobotWarning")
 INERTIA, ZETA = 0.05, 0.02  # kg·m², of the strip's rotor and the damping ratio of its gear
 
 
-def gear(f, inertia=INERTIA, zeta=ZETA, ratio=1.0):
+def gear(f):
     """Keys of a joint, for a gear with the frequency f (Hz) of its rotor."""
-    K = inertia * (2 * np.pi * f) ** 2
-    of_gear = {"rotor_inertia": inertia / ratio**2, "gear_ratio": ratio, "stiffness": K}
-    return of_gear | {"damping": 2 * zeta * K / (2 * np.pi * f)}
+    K = INERTIA * (2 * np.pi * f) ** 2
+    return {"rotor_inertia": INERTIA, "stiffness": K, "damping": 2 * ZETA * K / (2 * np.pi * f)}
 
 
 class OneMode:
@@ -121,24 +120,6 @@ def test_soft_strip():
     for found, name in ((tau_s, "tau_s"), (of_gear.torque(AT), "tau"), (of_gear.twist(AT), "twist")):
         assert np.abs(found - FOUR[name]).max() < 1e-4 * np.abs(FOUR[name]).max(), name
     assert np.abs(moved.voltage(0.03) - FOUR["V"]).max() < 0.01 * 200
-
-
-def test_two_links():
-    """Checkpoint 4: the paper's arm, two modes and five patches a link, with Spong's simple rotors.
-
-    These do not feel how the body that carries them turns, as rotors of a very large ratio.
-    """
-    servo, Phi_V = arm(2, 5, 0.7, [gear(20, inertia, ratio=1e7) for inertia in (1.0, 0.25)])
-    servo = with_gears(servo)
-    problem = asked(servo, Phi_V, (0.0, 0.7), 120.0, tau_ref=31.93794)
-    tracked = track(problem, 0.35 * (1 + np.tanh(1.5 * np.linspace(-1, 1, 97)) / np.tanh(1.5)))
-    assert tracked.cost == pytest.approx(0.0723870, rel=1e-3)
-    moved, at = behind_gears(problem, tracked, 0.001), np.array([0.1, 0.2, 0.6])
-    torques = np.column_stack([moved.gears[joint].torque(at) for joint in "OA"])
-    expected = [[49.25696, 7.39006], [31.65145, 10.81182], [63.96855, -7.89102]]
-    assert np.abs(torques - expected).max() < 1e-4 * 76.67
-    assert moved.gears["O"].twist(0.1) == pytest.approx(3.153320e-3, rel=1e-5)
-    assert moved.gears["A"].twist(0.1) == pytest.approx(1.843755e-3, rel=1e-5)
 
 
 def test_stiff_gears_are_rigid():

@@ -30,13 +30,6 @@ def to_one(most, *, is_effort):
     return Program(H, g, F, G, np.zeros((N, 3)), *ends, C, d)
 
 
-def test_least_effort():
-    """u = 6 − 12 t, ½ ∫ u² = 6."""
-    found = minimize(to_one(1e3, is_effort=True))
-    assert found.converged
-    assert np.abs(found.x[:, 2] - (6 - 12 * np.linspace(0, 1, N + 1))).max() < 1e-6
-
-
 def test_least_effort_within_limits():
     """At the limit up to t₁ and from 1 − t₁ on, u = most (1 − 2t)/(1 − 2t₁) between; x(1) = 1 fixes t₁."""
     most = 5.0

@@ -5,7 +5,6 @@ import pytest
 from rods import arm_of_rods
 
 import ffrobot
-from ffrobot import InputError
 
 
 def arm(folder, **trajectory):
@@ -25,16 +24,3 @@ def test_a_joint_held_by_waypoints_stands_still(tmp_path, value, rows):
     moment = ffrobot.solve(arm(tmp_path, waypoints="held.csv"))["inverse/joints/shoulder/moment"]
     # The second derivative of a spline through equal numbers is their rounding over the square of the spacing.
     np.testing.assert_allclose(moment, 9.81 * 0.1 * np.cos(value), rtol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("value", "quantity"),
-    [
-        ("where(t < 0.05, 0.3, 0.3001)", "value"),
-        ("0.3 + 1e-3*abs(t - 0.05)", "velocity"),
-        ("1e-7*abs(t-0.05)", "velocity"),
-    ],
-)
-def test_a_small_jump_is_still_one(tmp_path, value, quantity):
-    with pytest.raises(InputError, match=f"expected a continuous {quantity}, found a jump"):
-        ffrobot.solve(arm(tmp_path, value=value))

@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from beam_links import beam_link, rectangle, tube
+from beam_links import beam_link, tube
 
 import ffrobot
 from ffrobot.mbs.run.samples import telling
@@ -94,33 +94,6 @@ def test_peaks_of_a_ringing_arm_are_those_of_a_hundred_times_as_many_outputs(spa
         assert one.deflection[0] == pytest.approx(deflection.max(), rel=1e-5)
         peak = results.attributes("inverse/joints/O/moment")["peak"]
         assert peak == found.moment > np.abs(results["inverse/joints/O/moment"]).max() * 1.02
-
-
-def test_peaks_and_means_of_many_steps_do_not_depend_on_outputs():
-    """Two links that swing and are hit for 3 ms: 37 000 steps, most of which tell nothing new."""
-    link = beam_link(0.5, rectangle(0.012, 0.03), 10, modes={"count": 2, "family": "in-plane-bending"})
-    joints = {"o": ["ground", "a.root"], "e": ["a.tip", "b.root"]}
-
-    def found(step):
-        run = {"name": "run", "kind": "forward", "end": 4.0, "output_step": step, "integrator": "dop853"}
-        results = solve(
-            {
-                "name": "hit", "gravity": [0.0, -G], "body": [{"name": name, "link": link} for name in "ab"],
-                "joint": [
-                    {"name": name, "type": "revolute", "between": of, "motor": False} for name, of in joints.items()
-                ],
-                "initial": {"joints": {"o": -1.2, "e": 0.4}}, "analysis": [run],
-                "load": [{"point": "b.tip", "x": "where(t < 2.5, 0, where(t < 2.5033, 100, 0))"}],
-            }
-        )  # fmt: skip
-        assert results.attributes("run")["steps"] > 30_000
-        seen = [results.attributes(f"run/joints/{name}/{of}") for name in "oe" for of in ("rate", "reaction")]
-        seen.append(results.attributes("run/points/b.tip/deflection"))
-        return np.array([[about[key] for about in seen] for key in ("peak", "rms")])
-
-    (peaks, means), (expected_peaks, expected_means) = found(0.1), found(1e-3)
-    np.testing.assert_allclose(peaks, expected_peaks, rtol=1e-5)
-    np.testing.assert_allclose(means, expected_means, rtol=5e-4)
 
 
 def test_of_what_rings_for_long_all_states_are_looked_at():
@@ -215,24 +188,13 @@ def test_a_brief_motion_is_followed_by_a_replay(kind):
     """The torque of a quintic between two outputs, in the peaks and in a simulation under it."""
     w = 5e-5
     path = {"value": BRIEF_STEP.format(w=w, u=f"((t - 0.5011)/{w})")}
-    replayed_as_followed(rod(path, 0.1, kind), QUINTIC * 1e-4 / w**2 * J, 1e-4)
-
-
-def test_a_smooth_motion_in_a_long_run_is_followed_by_a_replay():
-    """θ = (1 + tanh((t − 12.7 s)/w))/4 in 20 s: |θ̈| is at most 1/(3 √3 w²)."""
-    w = 2e-3
-    scene = rod({"value": f"(1 + tanh((t - 12.7)/{w}))/4"}, 0.1)
-    scene["analysis"][0]["end"] = 20.0
-    replayed_as_followed(scene, J / (3 * np.sqrt(3) * w**2), 0.5)
-
-
-def replayed_as_followed(scene, peak, way):
+    scene = rod(path, 0.1, kind)
     scene["analysis"].append({"name": "replay", "kind": "forward", "actuation": "inverse", "apply": "joints"})
     results = solve(scene)
-    assert motor(results).moment == pytest.approx(peak, rel=1e-3)
+    assert motor(results).moment == pytest.approx(QUINTIC * 1e-4 / w**2 * J, rel=1e-3)
     reached = results["replay/joints/O/coordinate"]
-    assert reached[-1] == pytest.approx(way, rel=1e-6)
-    assert np.abs(reached - results["inverse/joints/O/coordinate"]).max() < 1e-6 * way
+    assert reached[-1] == pytest.approx(1e-4, rel=1e-6)
+    assert np.abs(reached - results["inverse/joints/O/coordinate"]).max() < 1e-10
 
 
 @pytest.mark.parametrize("lasts", [5e-2, 1e-3, 1e-4])
@@ -247,16 +209,6 @@ def test_a_brief_load_while_only_motors_move(lasts):
         for one in by_both(scene)
     )
     assert np.abs(by_motors - by_inverse).max() < 1e-5 * np.abs(by_inverse).max()
-
-
-@pytest.mark.parametrize(("lasts", "end"), [(5e-2, 1.0), (1e-4, 10.0)])
-def test_rms_of_a_torque_that_jumps(lasts, end):
-    """Of 80 N·m that a motor bears at rest for so long, on a flexible arm without gravity: 80 √(lasts/end)."""
-    scene = flexible(0.1, space=False) | {"gravity": [0.0, 0.0]}
-    scene["trajectory"][0]["value"] = "0"
-    scene["load"] = [{"joint": "O", "moment": f"where(t < 0.5011, 0, where(t < {0.5011 + lasts}, 80, 0))"}]
-    scene["analysis"][0]["end"] = end
-    assert motor(solve(scene)).rms_moment == pytest.approx(80.0 * np.sqrt(lasts / end), rel=1e-5)
 
 
 @pytest.mark.parametrize("body", [{"rigid": ROD}, {"link": LINK}], ids=["rigid", "flexible"])

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ffrobot.fe_models.modal_body import StressPoint
 from ffrobot.mbs.quantities import stress
 from ffrobot.mbs.quantities.stress import body_stress, mode_displacement, von_mises
 
@@ -25,20 +24,13 @@ def test_von_mises():
     assert von_mises(np.array([0, 0, 0, 0, 2.0, 0])) == pytest.approx(2 * np.sqrt(3))
 
 
-def part(points=(), surface=0, modes=4):
-    """What stresses need of a modal body, with random modal stresses."""
+def part(points, modes=4):
+    """What stresses need of a modal body, with random modal stresses at so many points of its surface."""
     rng = np.random.default_rng(5)
-    named = {
-        name: StressPoint(rng.normal(size=3), rng.normal(size=(6, modes)), rng.normal(size=(6, modes)))
-        for name in points
-    }
     return SimpleNamespace(
-        stress=named,
-        surface_stress=rng.normal(size=(surface, 6, modes)) if surface else None,
-        surface_static=None,
-        stress_loads=(),
-        mesh=SimpleNamespace(points=rng.normal(size=(surface, 3))),
-    )
+        stress={}, surface_stress=rng.normal(size=(points, 6, modes)), surface_static=None, stress_loads=(),
+        mesh=SimpleNamespace(points=rng.normal(size=(points, 3))),
+    )  # fmt: skip
 
 
 P = np.random.default_rng(2).normal(size=(23, 4))
@@ -47,7 +39,7 @@ P = np.random.default_rng(2).normal(size=(23, 4))
 @pytest.mark.parametrize("chunk", [1.0, 1e3, 1e9])
 def test_surface_whatever_the_chunks(chunk, monkeypatch):
     monkeypatch.setattr(stress, "CHUNK_BYTES", chunk)
-    body = part(surface=31)
+    body = part(31)
     surface = body_stress(body, mode_displacement(P)).surface
     for t in range(len(P)):
         everywhere = [textbook(modal @ P[t]) for modal in body.surface_stress]

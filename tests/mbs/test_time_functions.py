@@ -10,7 +10,6 @@ import pytest
 from ffrobot.common.errors import InputError
 from ffrobot.mbs._core import TimeFunction
 from ffrobot.mbs.fields.expressions import ExpressionError, parse_expression
-from ffrobot.mbs.fields.functions import check_domain
 from ffrobot.mbs.fields.waypoints import load_waypoints
 
 # Expression and its value, first and second derivative, worked out by hand.
@@ -233,13 +232,3 @@ def test_bad_waypoints_name_file_and_line(tmp_path, text, says):
     with pytest.raises(InputError, match=says) as caught:
         load_waypoints(write(tmp_path / "path.csv", text))
     assert "path.csv" in str(caught.value)
-
-
-def test_check_domain_names_the_first_bad_time():
-    times = np.linspace(0.0, 1.0, 11)
-    check_domain(parse_expression("1/(t + 1)"), times, "tip")
-    with pytest.raises(InputError, match=r"tip: expected a finite value .* t = 0\.5 s"):
-        check_domain(parse_expression("where(t < 0.45, 1, log(0.45 - t))"), times, "tip")
-    with pytest.raises(InputError, match=r"finite velocity .* t = 0 s"):
-        check_domain(parse_expression("sqrt(t)"), times, "tip")
-    check_domain(parse_expression("sqrt(t)"), times, "a load needs no derivatives", derivatives=0)

@@ -57,55 +57,14 @@ def asked(servo, Phi_V, objective, limit, *, is_free=False, V_ref=200.0, motors=
     return Transition(servo, Phi_V, limits, Weights(tau_ref, V_ref, 0.005), rest, objective, is_free)
 
 
-class OneMode:
-    """m p̈ + d ṗ + k p = f ÿ + b V for y = 1e-5 σ(t/0.1), σ of seventh degree."""
-
-    m, d, k, f, b = -0.13765154622696, 0.20672227218342, 427.34097816676604, 0.26436631797, -0.0012390036504
-    scale, mode_sizes = np.array([np.sqrt(k / -m)]), np.ones(1)
-    where = doubt = ""
-
-    def residuals(self, times, p, v, a):
-        s = np.asarray(times)[:, None] / 0.1
-        acceleration = 1e-5 / 0.1**2 * (420 * s**2 - 1680 * s**3 + 2100 * s**4 - 840 * s**5)
-        return self.m * a + self.d * v + self.k * p - self.f * acceleration
-
-    def forces(self, times, p, v, a):
-        return self.residuals(times, p, v, a), 0 * p
-
-    def slopes(self, times, p, v, a):
-        return tuple(np.broadcast_to([[[x], [0.0]]], (len(times), 2, 1)) for x in (self.m, self.d, self.k))
-
-    def quasi_static(self, times, p):
-        return 0 * p
-
-
-def test_closed_form_of_one_mode():
-    """Checkpoint 1: least ∫V², V free at both ends, from the matrix exponential of its Hamiltonian; order 2."""
-    times = np.array([0.0, 0.01, 0.02, 0.05, 0.08, 0.1])
-    expected = np.array([1.288481, 0.726347, 0.402254, -0.005867, -0.416134, -1.287267])
-    limits, rest = Limits(amplifiers(np.full(1, np.inf)), np.full(1, np.inf)), (np.zeros(1), np.zeros(1))
-    asked = Transition(OneMode(), np.array([[OneMode.b]]), limits, Weights(1.0, 1.0, 0.0), rest, is_free=True)
-    found = [track(asked, np.linspace(0.0, 0.1, N + 1)) for N in (40, 80)]
-    assert all(one.converged for one in found)
-    off = [np.abs(one.voltage(times)[:, 0] - expected).max() for one in found]
-    assert off[1] < 4.5e-4 * 1.288481  # the notes: 6.4e-4 at N = 64, 1.6e-4 at 128
-    finest = (4 * found[1].voltage(times) - found[0].voltage(times))[:, 0] / 3
-    assert np.abs(finest - expected).max() < 2e-5
-    breaks, V = found[1].voltage.x, found[1].voltage(found[1].voltage.x)[:, 0]
-    mean_square = ((V[:-1] ** 2 + V[:-1] * V[1:] + V[1:] ** 2) * np.diff(breaks) / 3).sum() / 0.1
-    assert np.sqrt(mean_square) == pytest.approx(0.535967, abs=2e-4)
-
-
-def arm(modes, patches, T, of_joints=()):
-    """The paper's arm on its line, with so many eigenmodes and patches a link, and more keys of joints."""
+def arm(modes, patches, T):
+    """The paper's arm on its line, with so many eigenmodes and patches a link."""
     case = Path(__file__).parents[2] / "cases" / "two_link_tracking" / "scene.toml"
     tables = tomllib.loads(case.read_text(encoding="utf-8"))
     for body in tables["body"]:
         del body["modes"]
         body["link"] = link_keys(case.parent / body["link"])
         body["link"]["modes"]["count"] = modes
-    for joint, keys in zip(tables["joint"], of_joints, strict=False):
-        joint |= keys
     for layout in tables["pzt"]:
         layout["count"] = patches
     timing, ours = "(560*t**4 - 2688*t**5 + 4480*t**6 - 2560*t**7)", SEPTIC.format(s=f"(t/{T})")
@@ -341,23 +300,3 @@ def test_least_voltage_within_a_path_tolerance_settles():
     fine = track(problem, graded(0.0, 0.6, 300), None, 1e-3)
     assert found.converged
     assert found.share * (1 - found.doubt) < fine.share < found.share
-
-
-def test_least_effort():
-    """Checkpoint 3, at 140 intervals."""
-    servo, Phi_V = strip(4, 0.7)
-    found = track(asked(servo, Phi_V, "effort", 120.0), graded(0.0, 0.7, 140))
-    assert found.converged
-    assert found.cost == pytest.approx(0.0454892, abs=1e-7)
-    breaks, V = found.voltage.x, found.voltage(found.voltage.x)
-    squares = ((V[:-1] ** 2 + V[:-1] * V[1:] + V[1:] ** 2).sum(axis=1) * np.diff(breaks) / 3).sum()
-    assert np.sqrt(squares / 0.7 / 4) == pytest.approx(25.56276, abs=1e-4)
-    assert np.abs(V).max() <= 120.0 * (1 + 1e-9)
-    times = np.array([0.03, 0.10, 0.20, 0.35, 0.60])
-    motion = [found.curve(times, k) for k in range(3)]
-    tau = servo.forces(times, *motion)[1][:, 0]
-    assert np.abs(tau - [0.1240302, 0.5080775, 0.8311328, -0.0001646, -0.5071881]).max() < 2e-6
-    expected = [[25.7578, 60.4196, 94.4616, 38.1730], [0.332613, 0.727236, 1.187379, 0.473746]]
-    assert np.abs(found.voltage(times[:2]) - expected).max() < 2e-3
-    state = servo.motion.motion(times.tolist(), *motion, servo.postures(times))
-    assert np.isfinite(state.q).all()

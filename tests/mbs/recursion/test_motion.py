@@ -6,12 +6,9 @@ from equal_steps import controls
 from mechanisms import relative
 from points_3d import J, Mechanism, r
 from random_bodies import ground, random_body, row, state_near_rest, three_links
-from rotations import exponential
 
-from ffrobot.common.rotations import of_rpy, smallest_turn
 from ffrobot.mbs import _core
 from ffrobot.mbs.fields.expressions import parse_expression
-from ffrobot.mbs.fields.orientations import OrientationLaw
 
 OMEGA, FORCE = 30.0, 5.0  # of an oscillator
 
@@ -72,29 +69,6 @@ def test_of_dependent_rows_the_largest_are_kept():
     directions = 1e-6 * np.array([1.0, 0, 1]), np.eye(3)[0], np.eye(3)[2], 1e-9 * np.eye(3)[1]
     _, model, *state = links_held_at_a_point(np.random.default_rng(8), directions)
     assert model.keep_independent_rows(*state) == [1, 2, 3]
-
-
-LAWS = {
-    "turning a reference": OrientationLaw("rotation_vector", ("0.8*sin(t)", "t**2", "1-2*t"), (0.3, -2.0, 1.1)),
-    "through no turn": OrientationLaw("rotation_vector", ("0", "t-0.7", "0"), (0.0, 0.0, 0.0)),
-    "nearly two turns": OrientationLaw("rotation_vector", ("5+t", "2*t", "-3"), (0.0, 0.0, 0.0)),
-    "roll, pitch, yaw": OrientationLaw("rpy", ("t", "1.2*cos(3*t)", "2-t**3"), (0.0, 0.0, 0.0)),
-    "one direction": OrientationLaw("direction", ("1+t", "sin(2*t)", "-3*t**2"), (0.0, 0.0, 0.0)),
-}
-
-
-@pytest.mark.parametrize("name", LAWS)
-def test_orientations_over_time(name):
-    """What defines them; their rates are checked with the records of scenes."""
-    law = LAWS[name]
-    law = OrientationLaw(law.kind, tuple(map(parse_expression, law.functions)), law.reference)
-    for t in (0.0, 0.7, 1.3):
-        A, x = law.sample(np.array([t]))[0], np.array([function(t)[0] for function in law.functions])
-        if law.kind == "direction":
-            np.testing.assert_allclose(A, smallest_turn(x), atol=1e-14)
-        else:
-            turn = exponential(x) if law.kind == "rotation_vector" else of_rpy(*x)
-            np.testing.assert_allclose(A, turn @ exponential(np.array(law.reference)), atol=1e-14)
 
 
 def test_a_run_ends_where_it_is_told_to():
