@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self, get_args
 
 import numpy as np
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, model_validator
 
 from ...common.deferred import ReadBy
 from ...common.errors import quoted
@@ -121,7 +121,13 @@ def check_sampling(sensors: Sequence[Sensor], T: float, whose: str, *, at_every_
                 raise ValueError(f"expected sensors that read at every sample, found no. {k} slower")
 
 
-Matrix = tuple[tuple[float, ...], ...]
+def _even(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
+    if len(lengths := {len(row) for row in rows}) > 1:
+        raise ValueError(f"expected lists of equal length, found {sorted(lengths)} numbers")
+    return rows
+
+
+Matrix = Annotated[tuple[tuple[float, ...], ...], AfterValidator(_even)]
 
 
 class ObserverRecord(Record):
