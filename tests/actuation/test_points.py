@@ -11,8 +11,6 @@ from ffrobot.common.errors import InputError
 from ffrobot.mbs.model.body import rigid_body
 from ffrobot.mbs.scene.space import PLANE
 
-IN_PLANE = [0, 1, 5]  # of force and moment on the frame
-
 
 def point_set(body, planar, **keys):
     return make_point_set(ActuationPoints(body="link", **keys), body, planar, PLANE)
@@ -20,35 +18,6 @@ def point_set(body, planar, **keys):
 
 def chosen(body, planar=None, **keys):
     return point_set(body, planar_body(body) if planar is None else planar, **keys)
-
-
-def L_a(points, p):
-    """(3 + n, components) in the plane; nothing else is done to the body."""
-    found = points.L_a(p[None])[0]
-    assert not np.delete(found[:6], IN_PLANE, axis=0).any()
-    return np.vstack([found[IN_PLANE], found[6:]])
-
-
-def test_columns_are_the_gradients_of_the_points(cantilever):
-    """L_a = [A e; e·(A_θ u rotated back); Φ_eᵀ]: differences of r = R + A (x + Φ p) along e."""
-    body = cantilever(4)
-    points = chosen(body, axial=(1.0,), transverse=(0.25, "tip"))
-    p, theta, h = 1e-2 * np.arange(1.0, 5.0), 0.7, 1e-6
-    A = np.array([[np.cos(theta), -np.sin(theta)], [np.sin(theta), np.cos(theta)]])
-
-    def position(point, x):
-        c, s = np.cos(x[2]), np.sin(x[2])
-        return x[:2] + np.array([[c, -s], [s, c]]) @ (point.position[:2] + point.translation[:2] @ x[3:])
-
-    x = np.concatenate([[0.3, -0.2, theta], p])
-    found = L_a(points, p)
-    for k, (point, direction) in enumerate(zip(points.points, points.direction[:2].T, strict=True)):
-        slopes = [
-            (position(point, x + h * unit) - position(point, x - h * unit)) @ (A @ direction) / (2 * h)
-            for unit in np.eye(len(x))
-        ]
-        in_global = np.concatenate([A @ found[:2, k], found[2:, k]])
-        np.testing.assert_allclose(in_global, slopes, atol=1e-8)
 
 
 def test_points_of_a_rigid_body_go_by_name():

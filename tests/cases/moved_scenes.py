@@ -10,7 +10,7 @@ import numpy as np
 import scene_of
 from checkpoint_mechanisms import load
 from checkpoint_scenes import rpy
-from rotations import exponential, logarithm
+from rotations import exponential
 
 MIRROR = np.diag([1.0, -1.0, 1.0])
 
@@ -80,14 +80,7 @@ def _joint(joint, Q, is_mirrored):
 def _trajectory(path, Q):
     if "joint" in path:
         return path
-    found = path | dict(zip("xyz", combined(Q, [path[c] for c in "xyz"]), strict=True))
-    if "rotation_vector" in path:
-        found["rotation_vector"] = combined(turning(Q), path["rotation_vector"])
-        reference = np.array(path["reference_rotation_vector"])
-        # exp(ψ) R: R turned as a whole is Q R, in a mirror Q R Q
-        reference = turning(Q) @ reference if np.linalg.det(Q) < 0 else logarithm(Q @ exponential(reference))
-        found["reference_rotation_vector"] = reference.tolist()
-    return found
+    return path | dict(zip("xyz", combined(Q, [path[c] for c in "xyz"]), strict=True))
 
 
 def combined(Q, expressions):

@@ -175,13 +175,6 @@ def arm(pieces, **keys):
 INVERSE = {"name": "inverse", "kind": "pcid", "end": 1.0, "output_step": 0.02, "tolerance": 1e-6}
 
 
-def test_pieces_follow_a_path_at_a_tight_tolerance():
-    """Rounding of forces under its rows once made steps without end below 3e-7."""
-    tight = INVERSE | {"end": 0.1, "tolerance": 1e-8, "max_steps": 8000}
-    with arm(2, analysis=[tight]) as results:
-        assert results.attributes("inverse")["status"] == "completed"
-
-
 @pytest.mark.parametrize("condition", ["cantilever", pytest.param("simply-supported", marks=pytest.mark.nightly)])
 def test_rates_of_the_one_link_are_derivatives(condition):
     """R, e and p of the link as found from the pieces, and the velocities that are told beside them."""

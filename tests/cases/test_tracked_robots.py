@@ -59,14 +59,14 @@ def in_plane(*layouts, solid=False, **tables):
     )  # fmt: skip
 
 
-def in_3d(*, solid=False, patch=None, **tables):
+def in_3d(*, patch=None, **tables):
     """A rod on a waist and a shoulder, under gravity, with layouts in two planes."""
     return scene(
         0.35, [0.0, 0.0, -9.81],
         {"point": "arm.tip", "y": f"0.45*{septic(0.35)}", "z": f"0.28 + 0.25*{septic(0.35)}"},
         body=[
             rigid("column", 2.0, [0.01, 0.01, 0.005], [0.0, 0.0, 0.1], top=[0.0, 0.0, 0.2]),
-            {"name": "arm", "link": strip(0.8, 0.006, 0.006, solid=solid, **BOTH_PLANES)},
+            {"name": "arm", "link": strip(0.8, 0.006, 0.006, **BOTH_PLANES)},
         ],
         joint=[
             revolute("waist", "ground", "column.root", axis=[0.0, 0.0, 1.0]),
@@ -153,16 +153,12 @@ ROBOTS = {
     "3D, gears": lambda: geared(in_3d(), 30, waist=0.05, shoulder=0.05),
     "3D, loop, gear": lambda: geared(slider_crank(), 40, crank=0.01),
 }
-SLOW = {
-    "3D, solid with patches as parts": lambda: in_3d(solid=True, patch=PART),
-    "loop, gears": lambda: geared(five_bar(), 40, A=0.02, D=0.02),
-}
 
 
-@pytest.mark.parametrize("robot", [*ROBOTS, *(pytest.param(name, marks=pytest.mark.nightly) for name in SLOW)])
+@pytest.mark.parametrize("robot", ROBOTS)
 def test_replay_follows_the_path(robot):
     """Torques and voltages in the nonlinear equations: 1e-8 of the way; torques alone are a hundred times farther."""
-    model = ffrobot.make_scene(**(ROBOTS | SLOW)[robot]())
+    model = ffrobot.make_scene(**ROBOTS[robot]())
     with ffrobot.solve(model) as results:
         wanted, found = (
             results[f"{name}/points/{model.trajectory[0].point}/position"] for name in ("carried", "replay")

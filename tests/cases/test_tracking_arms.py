@@ -192,9 +192,9 @@ def test_least_voltage_that_does_not_settle(scene, timing, is_said):
     assert all(f"it may be {100 * doubt:.2g} % less" in warning for warning in said)
 
 
-@pytest.mark.parametrize("limit", [1.07, *(pytest.param(x, marks=pytest.mark.nightly) for x in (1.1, 1.09))])
-def test_motors_at_their_limits(scene, limit):
+def test_motors_at_their_limits(scene):
     """Torques and voltages stay within both limits, between Gauss points, too; in many intervals all four are at it."""
+    limit = 1.07  # N·m
     with ffrobot.solve(scene(("moment_limit = 2.0", f"moment_limit = {limit}"), alone=True)) as results:
         assert results.attributes("carried/tracking")["objective"] == "effort"
         assert results["carried/tracking/torque_price/hub"].max() > 1e-6
