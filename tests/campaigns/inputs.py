@@ -1,8 +1,8 @@
-"""URDF, meshes, motions, tables, HDF5, SID, .fem files, arguments of studies, one change each: refused, or taken.
+"""URDF, meshes, motions, tables, HDF5 files, arguments of studies, one change each: refused, or taken.
 
     python tests/campaigns/inputs.py [--count 100] [--seed 0] [--kind KIND …] [--record]
 
-Kinds are urdf, skin, mesh, motion, bag, csv, modal, results, bytes, sid, fem, study, catalog and controller.
+Kinds are urdf, skin, mesh, motion, bag, csv, modal, results, bytes, study, catalog and controller.
 
 Run by hand, some 0.3 s each. Attributes, cells and datasets get values of other types, huge, tiny, not finite, empty,
 names that lead elsewhere, and text that programs would run: a file CANARY must not appear, nor anything beside the
@@ -66,7 +66,6 @@ trajectory = [{ name = "swing", joint = "shoulder", waypoints = "path.csv" }]
 payload = [{ point = "arm.tip", mass = 0.5 }]
 analysis = [{ name = "inverse", kind = "pcid", end = 0.05, output_step = 0.005, tolerance = 1e-4, max_steps = 20000 }]
 """
-BODIES = {".SID_FEM": "sid", ".fem": "mbdyn"}
 ROBOT = """<robot name="r"><link name="base"/><link name="arm">
 <inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
 <visual><geometry><mesh filename="{}"/></geometry></visual></link>
@@ -108,8 +107,7 @@ class Campaign:
         self.ready.mkdir()
         for name, text in (("scene.toml", SCENE), ("arm.toml", LINK), ("path.csv", TABLE)):
             (self.ready / name).write_text(text, encoding="utf-8")
-        exports = [["export", "arm.h5", "-o", f"body{end}", "--format", form] for end, form in BODIES.items()]
-        for command in (["link", "arm.toml"], ["solve", "scene.toml"], *exports):
+        for command in (["link", "arm.toml"], ["solve", "scene.toml"]):
             code, told = run(command, self.ready)
             assert code == 0, told
         box = trimesh.creation.box((0.1, 0.2, 0.3))
@@ -216,26 +214,6 @@ class Campaign:
         commands = [["info", "arm.h5"], ["export", "arm.h5", "--format", self.draw.choice(("sid", "mbdyn", "exudyn"))]]
         return label, "arm.h5", commands
 
-    def sid(self):
-        return self.exchanged("body.SID_FEM")
-
-    def fem(self):
-        return self.exchanged("body.fem")
-
-    def exchanged(self, name: str):
-        """A word, a line or a stretch of a body in text is another."""
-        lines = (self.place / name).read_text(encoding="utf-8").splitlines()
-        row, how = self.draw.randrange(len(lines)), self.draw.choice(("word", "word", "word", "line", "twice", "cut"))
-        words = lines[row].split(" ")
-        if how == "word":
-            words[self.draw.randrange(len(words))] = self.draw.choice((*TEXTS, "(1, )", "(99, 1)", "2", "end", "-7"))
-        lines[row] = " ".join(words)
-        end = {"line": row + 1, "cut": row + self.draw.randrange(1, 40)}.get(how, row)
-        label = f"{how} {row + 1}: {lines[row][:80]!r}"
-        lines[row:end] = [lines[row]] if how == "twice" else []
-        (self.place / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
-        return label, name, [["import", name, "-o", "out.h5"]]
-
     def results(self):
         label, name = self.damaged(self.place / "scene.results.h5"), "scene.results.h5"
         reads = [["info", name], ["feasibility", name], ["export", name, "--format", "csv"], ["linear", name],
@@ -312,8 +290,7 @@ class Campaign:
 
 
 KINDS = (
-    "urdf", "skin", "mesh", "motion", "bag", "csv", "modal", "results", "bytes", "sid", "fem", "study", "catalog",
-    "controller",
+    "urdf", "skin", "mesh", "motion", "bag", "csv", "modal", "results", "bytes", "study", "catalog", "controller",
 )  # fmt: skip
 
 

@@ -31,7 +31,7 @@ def given():
 
 
 def test_random_changes(given, tmp_path):
-    """Other ones are those of tests/campaigns/inputs.py. No warning of Python's or NumPy's either."""
+    """No warning of Python's or NumPy's either."""
     chance, ends = random.Random("suite"), Counter()
     damage = Damage(chance, b"")
     for _ in range(300):
