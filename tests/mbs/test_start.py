@@ -4,10 +4,8 @@ import warnings
 
 import numpy as np
 import pytest
-from checkpoint_mechanisms import CASES
 from checkpoint_scenes import checkpoint_scene, tree_model
 from random_mechanisms import Tree
-from tree_oracle import row_values, target_rates
 
 from ffrobot.mbs.model.body import rigid_body
 from ffrobot.mbs.model.build import build_model
@@ -19,17 +17,6 @@ from ffrobot.run.bodies import load_bodies
 def model_of(name):
     scene = checkpoint_scene(name)
     return build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None).values()])
-
-
-@pytest.mark.parametrize("name", CASES)
-def test_rates_of_rows_are_those_of_their_values(name):
-    """What C_v v has to be, against differences of C in time at the posture of t = 0.01 s."""
-    model, h, t = model_of(name), 1e-6, 0.01
-    q = model.constraints.posture(undeformed_posture(model).q, t)
-    values = row_values(model, np.array([q, q]), np.array([t - h, t + h]))[0]
-    rates = target_rates(model, q[None], np.array([t]))[0]
-    assert np.abs(row_values(model, q[None], np.array([t]))[0]).max() < 1e-12
-    np.testing.assert_allclose((values[0] - values[1]) / (2 * h), rates, atol=1e-9 * max(1.0, np.abs(rates).max()))
 
 
 @pytest.mark.parametrize(

@@ -47,31 +47,6 @@ def test_bodies_stand_where_the_oracle_has_them(seed, turned):
         np.testing.assert_allclose(quaternion(frame.F[0]) * np.sign(e @ quaternion(frame.F[0])), e, atol=1e-13)
 
 
-@pytest.mark.parametrize("turned", [False, True], ids=["outwards", "inwards"])
-def test_jacobians_by_differences(turned):
-    """L of every frame and section, and C_v of all rows of loops, against differences along `integrate`."""
-    rng = np.random.default_rng(7)
-    tree = random_tree(rng, TYPES, loops=3)
-    (_, model, q), h = built(tree, turned), 1e-6
-    for node in model.tree.nodes:
-        q[node.p_q] = 0.1 * rng.standard_normal(node.body.n_modes)
-    steps = h * np.eye(model.tree.n_v)
-    ahead, behind = model.tree.integrate(q, steps), model.tree.integrate(q, -steps)
-    times = np.zeros(model.tree.n_v)
-    _, C_v = row_values(model, q[None], np.zeros(1))
-    difference = (row_values(model, ahead, times)[0] - row_values(model, behind, times)[0]) / (2 * h)
-    np.testing.assert_allclose(difference.T, C_v[0], atol=2e-8)
-    section = model.tree.section("b9.tip", np.eye(3))
-    found = tree_oracle.motion(model.tree, section, q[None], tree_oracle.frames(model.tree, q[None]))
-    r = [
-        tree_oracle.motion(model.tree, section, moved, tree_oracle.frames(model.tree, moved))
-        for moved in (ahead, behind)
-    ]
-    np.testing.assert_allclose((r[0].r - r[1].r).T / (2 * h), found.L[0, :3], atol=2e-8)
-    turn = (r[0].F - r[1].F) @ found.F[0].T / (2 * h)
-    np.testing.assert_allclose(np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]]), found.L[0, 3:], atol=2e-8)
-
-
 def every_row(rng, model):
     """Rows of all kinds between random sections, with targets and orientations that move, for each body."""
     number, axes = _core.TimeFunction.polynomial, np.eye(3)
