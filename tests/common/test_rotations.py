@@ -33,14 +33,6 @@ def test_quaternions_and_logarithm_lead_back(vectors):
         assert np.all(e[..., 0] >= 0)
 
 
-def test_roll_pitch_yaw_as_in_urdf():
-    """Yaw alone turns x to y; pitch alone x to −z; the tool's x is not moved by roll."""
-    x = np.array([1.0, 0, 0])
-    np.testing.assert_allclose(rotations.of_rpy(0, 0, np.pi / 2) @ x, [0, 1, 0], atol=1e-15)
-    np.testing.assert_allclose(rotations.of_rpy(0, np.pi / 2, 0) @ x, [0, 0, -1], atol=1e-15)
-    np.testing.assert_allclose(rotations.of_rpy(0.3, -0.4, 0.5) @ x, rotations.of_rpy(0, -0.4, 0.5) @ x, atol=1e-15)
-
-
 @pytest.mark.parametrize("axis", [(0, 0, 2.0), (0, 0, -1.0), (1, 0, 0), (0, -3, 0), (0.2, -0.5, 0.1)])
 def test_smallest_turn(axis):
     C = rotations.smallest_turn(np.array(axis))

@@ -285,16 +285,6 @@ JOLTED = ARM | {
 MOST = 4e-6 * OMEGA**2  # of |α| = A ω² |12 sin² φ − 16 sin⁴ φ|, between the outputs at 0.1 and 0.101 s
 
 
-@pytest.mark.nightly
-def test_limits_of_peaks_between_outputs(write):
-    """There is a least N with (J / N + J_m N) α within a limit."""
-    share = 0.01  # J / N + J_m N, kg m²
-    within = optimise(
-        write(JOLTED), [f"{RATIO}=20:100"], minimise=f"value {RATIO}", subject_to=[f"{MOTOR} <= {share * MOST}"]
-    )
-    assert within.value == pytest.approx((share - np.sqrt(share**2 - 4.0 * J * 2e-5)) / 4e-5, rel=2e-3)
-
-
 def test_peaks_between_outputs_count(write):
     """The torque (J / N + J_m N) α is least at N = √(J / J_m); its power."""
     path = write(JOLTED)

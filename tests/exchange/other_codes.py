@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 PACKAGE = "pin==2.6.20"  # of the Python versions that this program runs on; with NumPy below 2
-DYNAMICS, STIFFNESS = (Path(__file__).with_name(f"pinocchio_{what}.py") for what in ("dynamics", "stiffness"))
+DYNAMICS = Path(__file__).with_name("pinocchio_dynamics.py")
 PATIENCE = 600  # s for a download of 100 MB
 
 
@@ -43,15 +43,6 @@ def _make(folder, python):
 
 def pinocchio_dynamics(python, urdf, names, **motion):
     """What `pinocchio_dynamics.py` answers for q, v, a and tau (T, n) of the joints `names`."""
-    request = {"names": names} | {key: np.asarray(values).tolist() for key, values in motion.items()}
-    return _answer(python, DYNAMICS, urdf, request)
-
-
-def pinocchio_stiffness(python, urdf, **request):
-    """What `pinocchio_stiffness.py` answers."""
-    return _answer(python, STIFFNESS, urdf, request)
-
-
-def _answer(python, script, urdf, request):
-    done = subprocess.run([python, script, urdf], input=json.dumps(request), capture_output=True, text=True, check=True)
+    request = json.dumps({"names": names} | {key: np.asarray(values).tolist() for key, values in motion.items()})
+    done = subprocess.run([python, DYNAMICS, urdf], input=request, capture_output=True, text=True, check=True)
     return json.loads(done.stdout)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from other_codes import pinocchio_dynamics, python_with_pinocchio
 from rigid_robots import ROBOTS, random_urdf
 
 from ffrobot.mbs.model.build import build_model
@@ -56,12 +57,19 @@ def close(found, expected):
     np.testing.assert_allclose(found / scale, expected / scale, rtol=0, atol=CLOSE)
 
 
-def test_accelerations_moments_and_mass_matrices(robot, pinocchio_dynamics):
+@pytest.fixture(scope="module")
+def python_of_pinocchio(pytestconfig, tmp_path_factory):
+    """Its interpreter; the environment is kept in pytest's cache if there is one."""
+    cache = getattr(pytestconfig, "cache", None)
+    return python_with_pinocchio(tmp_path_factory.mktemp("pinocchio") if cache is None else cache.mkdir("pinocchio"))
+
+
+def test_accelerations_moments_and_mass_matrices(robot, python_of_pinocchio):
     urdf, system, motion = robot
     tree = system.model.tree
     names = [node.joint.name for node in sorted(tree.nodes, key=lambda node: node.v.start)]
     assert len(names) == tree.n_v
-    expected = pinocchio_dynamics(urdf, names, **motion._asdict())
+    expected = pinocchio_dynamics(python_of_pinocchio, urdf, names, **motion._asdict())
 
     def accelerations(q, v, force):
         return system.core.evaluate(q, v, np.zeros(0), force, None)[0]

@@ -1,14 +1,11 @@
 """Links of a URDF that a link file makes flexible: where they stand, where joints are on them, what is refused."""
 
 import re
-import shutil
 import tomllib
 
 import gmsh
-import h5py
 import numpy as np
 import pytest
-from rigid_robots import moments, with_motion
 
 from ffrobot.mesh.gmsh_session import gmsh_session
 
@@ -64,25 +61,6 @@ def out(tmp_path_factory, ffrobot):
     done = import_with(ffrobot, folder)
     assert done.returncode == 0, done.stderr
     return folder / "out", done.stdout
-
-
-def test_a_stiff_link_carries_what_the_rigid_one_does(out, tmp_path, ffrobot):
-    """Weights in three postures: frames, interfaces and welds are where the URDF has them."""
-    scene = shutil.copytree(out[0], tmp_path / "out") / "scene.toml"
-    text, names = scene.read_text(), ("turn", "shoulder", "elbow")
-    rest = dict.fromkeys(names, 0.0)
-    for posture in ((0.0, 0.0, 0.0), (0.4, -1.0, 0.7), (-2.0, 0.5, 1.9)):
-        q = dict(zip(names, posture, strict=True))
-        moved = with_motion(text, q, rest, rest).replace(
-            "[initial.joints]", '[initial]\nstate = "static"\n[initial.joints]'
-        )
-        scene.write_text(moved)
-        ffrobot.ok("solve", scene)
-        expected = moments(ARM, q, rest, rest)
-        with h5py.File(scene.with_suffix(".results.h5")) as file:
-            found = [file[f"inverse/joints/{name}/moment"][0] for name in names]
-        # 30 N at the tip bend it by F L³/3EI = 9e-8 m, which moves moments by 3e-6 N·m.
-        np.testing.assert_allclose(found, [expected[name] for name in names], atol=9e-6)
 
 
 def test_the_link_file_gets_length_and_interfaces(out):

@@ -1,7 +1,6 @@
 """Rigid robots from their URDF through `ffrobot import` and `ffrobot solve`: motor moments against other codes."""
 
 import re
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -14,21 +13,16 @@ OTHERS = {
     "ur5": [-2.19784031, -54.77458172, -12.468253, 0.17824312, 0.47975015, -0.05791279],
     "z1": [0.140006549, 4.44682343, -7.27741968, -1.5586138, 0.553306243, 0.0226056378, 0.00447557451],
 }
-CASE = Path(__file__).parents[2] / "cases" / "arm_6r"
-# Likewise at q = 0.3(1 … n), q̇ = 0.2(n … 1), q̈ = 0.5 cos(0 … n − 1) by Pinocchio alone.
-OF_CASE = [
-    0.680362372872216, -23.62796142979181, -1.070964938424388, -0.0493105744644358, 2.341927292101834, 0.00159795706122,
-]  # fmt: skip
 
 
-def solved_moments(ffrobot, urdf, folder, motion, *options, friction=False, kind='kind = "pcid"'):
+def solved_moments(ffrobot, urdf, folder, motion, *, friction=False):
     """{joint: moment} at t = 0, with the friction of the URDF or without."""
-    ffrobot.ok("import", urdf, "-o", folder, *options)
+    ffrobot.ok("import", urdf, "-o", folder)
     scene = folder / "scene.toml"
     text = scene.read_text()
     if not friction:
         text = re.sub(r"^(viscous|coulomb)_friction = .*\n", "", text, flags=re.MULTILINE)
-    scene.write_text(with_motion(text, *motion).replace('\nkind = "pcid"', f"\n{kind}"))
+    scene.write_text(with_motion(text, *motion))
     ffrobot.ok("solve", scene)
     with h5py.File(scene.with_suffix(".results.h5")) as file:
         return {name: float(joint["moment"][0]) for name, joint in file["inverse/joints"].items() if "moment" in joint}
@@ -38,30 +32,13 @@ def joint_names(urdf):
     return re.findall(r'<joint name="(\w+)" type="(?!fixed)', urdf.read_text())
 
 
-def motion_of(names, of_place, of_acceleration):
-    n = len(names)
-    values = of_place * np.arange(1, n + 1), 0.2 * np.arange(n, 0, -1), of_acceleration * np.cos(np.arange(n))
-    return [dict(zip(names, row, strict=True)) for row in values]
-
-
-def test_straight_links_move_as_rigid_ones(tmp_path, ffrobot):
-    """A flexible link that is held straight (FCID with p = 0)."""
-    urdf = CASE / "arm.urdf"
-    motion, flexible = motion_of(names := joint_names(urdf), 0.3, 0.5), f"forearm={CASE / 'links' / 'tube.toml'}"
-    straight = 'kind = "fcid"\nshape = "zero"'
-    solved = solved_moments(ffrobot, urdf, tmp_path, motion, "--flexible", flexible, kind=straight)
-    found = [solved[name] for name in names]
-    with h5py.File(tmp_path / "scene.results.h5") as file:
-        assert "modal" in file["inverse/bodies/forearm"]
-    np.testing.assert_allclose(found, OF_CASE, atol=1e-10 * np.abs(OF_CASE).max())
-    of_urdf = moments(urdf.read_text(), *motion)
-    np.testing.assert_allclose(found, [of_urdf[name] for name in names], atol=1e-12 * np.abs(OF_CASE).max())
-
-
 @pytest.mark.parametrize("robot", OTHERS)
 def test_real_arms(robot, tmp_path, ffrobot):
     urdf = ROBOTS / f"{robot}.urdf"
-    motion = motion_of(names := joint_names(urdf), 0.1, 0.3)
+    names = joint_names(urdf)
+    n = len(names)
+    values = 0.1 * np.arange(1, n + 1), 0.2 * np.arange(n, 0, -1), 0.3 * np.cos(np.arange(n))
+    motion = [dict(zip(names, row, strict=True)) for row in values]
     found = solved_moments(ffrobot, urdf, tmp_path, motion)
     expected = OTHERS[robot]
     np.testing.assert_allclose([found[name] for name in names], expected, rtol=1e-8, atol=5e-9)

@@ -154,20 +154,6 @@ def test_signs_are_canonical(modal_body):
         assert values[np.argmax(np.abs(values) > np.abs(values).max() / 2)] > 0
 
 
-@pytest.mark.parametrize("condition", ["simply-supported", "cantilever"])
-def test_rotations_are_the_slopes(modal_body, condition):
-    """Euler–Bernoulli: rotation = (twist, −w', v'), against central differences of the interpolated displacement."""
-    body = modal_body(family="all", count=20, condition=condition)
-    step = 1e-5
-    for x in (0.1234, 0.51, 0.777):
-        left, right = body.interpolate(x - step), body.interpolate(x + step)
-        slope = (right.translation - left.translation) / (2 * step)
-        rotation = body.interpolate(x).rotation
-        size = np.maximum(np.abs(body.stations.rotation).max(axis=(0, 1)), 1e-3)
-        np.testing.assert_allclose(rotation[2] / size, slope[1] / size, atol=1e-6)
-        np.testing.assert_allclose(rotation[1] / size, -slope[2] / size, atol=1e-6)
-
-
 def test_extents_and_rigidities_of_the_sections(modal_body):
     """Heights by segment; E b³h/12 across the plane; J = b h³ (1/3 − 0.21 h/b (1 − h⁴/12b⁴)) (Roark)."""
     stepped = modal_body(count=3, **STEPPED_LINK).stations

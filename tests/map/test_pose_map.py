@@ -98,20 +98,6 @@ def test_a_pose_is_what_static_finds_there(arm, tmp_path):
     np.testing.assert_allclose(torque, moment, rtol=1e-7)
 
 
-def test_torque_and_manipulability_have_their_closed_forms(arm, tmp_path):
-    """Weight times lever of nearly straight links; √det(J Jᵀ) = l₁ l₂ |sin φ|."""
-    found = mapped(arm, tmp_path / "map", "shoulder=-60*deg:60*deg:5", "elbow=0.2:1.4:4")
-    angles = np.stack(np.meshgrid(np.radians(np.linspace(-60, 60, 5)), np.linspace(0.2, 1.4, 4), indexing="ij"), -1)
-    first, second = angles.reshape(-1, 2).T
-    weight = 9.81 * 2700 * 0.02 * 0.03 * np.array([0.6, 0.4])
-    elbow = weight[1] * 0.2 * np.cos(first + second)
-    shoulder = weight[0] * 0.3 * np.cos(first) + weight[1] * 0.6 * np.cos(first) + elbow
-    order = [found.motors.index(name) for name in ("shoulder", "elbow")]
-    np.testing.assert_allclose(found.values["torque"][:, order].T, [shoulder, elbow], atol=5e-3 * shoulder.max())
-    np.testing.assert_allclose(found.values["manipulability"], 0.6 * 0.4 * np.abs(np.sin(second)), rtol=1e-12)
-    np.testing.assert_allclose(found.limits[order], [20.0, 10.0])
-
-
 def test_places_keep_the_branch_of_the_start_and_say_what_is_out_of_reach(arm, tmp_path):
     found = mapped(arm, tmp_path / "map", "x=0.11:1.31:13", "y=-0.6:0.6:9")
     x, y = (

@@ -31,14 +31,6 @@ def test_faces_and_volume_by_dolfinx(solid, cell):
         assert total(x[0] * ds(body.part.faces[name])) == pytest.approx(area * first, abs=1e-12)
 
 
-def test_curved_cells_by_dolfinx(solid):
-    body = solid_mesh(PartTables(LINK, solid(section=CircleSection(shape="circle", diameter=0.1))))
-    x = ufl.SpatialCoordinate(body.mesh)
-    volume = np.pi * 0.05**2
-    assert total(fem.Constant(body.mesh, 1.0) * ufl.dx(body.mesh)) == pytest.approx(volume, rel=1e-3)
-    assert total(x[1] ** 2 * ufl.dx(body.mesh)) == pytest.approx(volume * 0.05**2 / 4, rel=3e-3)
-
-
 @pytest.mark.parametrize("mesh", [{}, {"cell": "hexahedron"}, {"divisions": (60, 6, 6)}])
 def test_the_surface_is_closed_and_faces_outward(solid, mesh):
     surface = solid_mesh(PartTables(LINK, solid(), SolidMeshRecord(**mesh))).surface

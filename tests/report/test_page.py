@@ -93,16 +93,6 @@ def test_exaggerated_links_stay_joined(paused, arm_3r):
     assert np.linalg.norm(moved) > 0.05  # 5 mm of deflection across, 19 times
 
 
-def test_pixels_move(paused):
-    """The robot is there, and elsewhere at another time."""
-    show(paused, 0.0)
-    start = pixels(paused)
-    show(paused, 0.6)
-    end = pixels(paused)
-    assert min(start.sum(), end.sum()) > 300
-    assert min((start & ~end).sum(), (end & ~start).sum()) > 200
-
-
 def drag(browser, selector, pixels, moves=9):
     """Drag to the right as a hand does: the page sees every move (what falls between two pictures is lost)."""
     middle = browser.driver.find_element("css selector", selector)

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.spatial.transform import Rotation
 
 from ffrobot.cli import cli
 from ffrobot.common.errors import InputError, SolveError
@@ -16,23 +17,17 @@ GRIDS = Options(pictures=False)
 DIGITS = 2e-7  # numbers in the files have 7 digits; lengths are about 1 m
 
 
-@pytest.fixture(scope="module")
-def two_link_grids(two_link, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("view")
-    options = Options(analysis="joints_only", frames=5, pictures=False)
-    viewed = view_file(two_link.folder / "scene.results.h5", folder, options)
-    assert viewed.paths == [folder / "joints_only.vtkhdf"]
-    return viewed.paths[0]
-
-
 def axis(points):
     """Middles of the rings of four corners that a rectangular beam is swept from."""
     return points.reshape(-1, 4, 3).mean(axis=1)
 
 
-def test_exaggeration_keeps_joints_shut(read, two_link, two_link_grids):
+def test_exaggeration_keeps_joints_shut(read, two_link, tmp_path):
     """At 20 times the deflection, too, link 2 begins where link 1 ends, and link 1 stays on the ground."""
-    for time, _, points, data, _ in read(two_link_grids):
+    options = Options(analysis="joints_only", frames=5, pictures=False)
+    paths = view_file(two_link.folder / "scene.results.h5", tmp_path, options).paths
+    assert paths == [tmp_path / "joints_only.vtkhdf"]
+    for time, _, points, data, _ in read(paths[0]):
         shown = points + 19.0 * data["exaggeration"]
         link1, link2 = axis(shown[:244]), axis(shown[244:])
         np.testing.assert_allclose(link1[0], 0.0, rtol=0, atol=20 * DIGITS)
@@ -133,3 +128,48 @@ def test_what_is_refused(solid_arm, tmp_path):
     with pytest.raises(InputError, match="expected a results file, found no such file"):
         view_file(tmp_path / "none.h5", tmp_path / "a")
     assert not (tmp_path / "a").exists()
+
+
+def rings(points, count):
+    """Middles and radii of the `count` rings of a tube."""
+    corners = points.reshape(count, -1, 3)
+    middle = corners.mean(axis=1)
+    return middle, np.linalg.norm(corners - middle[:, None], axis=2)
+
+
+def parts(points, results):
+    """Points of column (a line), upper arm and forearm (tubes), in the order of the grid."""
+    stations = [len(results.modal_body(name).stations.position) for name in ("upper", "fore")]
+    corners, column = divmod(len(points), sum(stations))
+    first = column + corners * stations[0]
+    return points[:column], rings(points[column:first], stations[0]), rings(points[first:], stations[1])
+
+
+def test_tubes_are_where_they_were_solved(arm_3r, read, tmp_path):
+    """At five steps."""
+    viewed = view_file(arm_3r.folder / "scene.results.h5", tmp_path, Options(frames=5, pictures=False))
+    assert [path.name for path in viewed.paths] == ["inverse.vtkhdf"]
+    grids = read(viewed.paths[0])
+    with Results(arm_3r.folder / "scene.results.h5") as results:
+        largest = results.peak("inverse/points/fore.tip/deflection")[1]  # the output next to it is in the grids
+        assert [time for time, *_ in grids] == pytest.approx([0.0, 0.15, np.round(largest / 0.005) * 0.005, 0.45, 0.6])
+        for time, _, points, _, cells in grids:
+            (row,) = arm_3r.rows("inverse", [time])
+            column, upper, fore = parts(points, results)
+            assert set(cells["body"]) == {0, 1, 2}
+            for at, name in ((column, "column.top"), (column, "column.root")):
+                expected = results[f"inverse/points/{name}/position"][row]
+                assert np.linalg.norm(at - expected, axis=1).min() < DIGITS
+            for (middle, radius), name, outer in ((upper, "upper", 0.0055), (fore, "fore", 0.004)):
+                for end, label in ((0, "root"), (-1, "tip")):
+                    expected = results[f"inverse/points/{name}.{label}/position"][row]
+                    np.testing.assert_allclose(middle[end], expected, rtol=0, atol=DIGITS)
+                np.testing.assert_allclose(radius, outer, rtol=2e-3)
+                # r = R + A (x + Φ p), with SciPy's rotation, at the station in the middle of the link
+                body = results.modal_body(name)
+                k = len(body.stations.position) // 2
+                x = body.stations.position[k] + body.stations.translation[k] @ results.modal("inverse", name)[row]
+                e = results[f"inverse/bodies/{name}/quaternion"][row]
+                turned = Rotation.from_quat([*e[1:], e[0]]).apply(x)
+                expected = results[f"inverse/bodies/{name}/position"][row] + turned
+                np.testing.assert_allclose(middle[k], expected, rtol=0, atol=DIGITS)
