@@ -1,4 +1,4 @@
-"""Residual attachment modes of solids: flexibility that does not depend on the number of modes, and identities."""
+"""Residual attachment modes of solids: flexibility of beam theory, whatever the number of modes."""
 
 import numpy as np
 import pytest
@@ -10,29 +10,11 @@ ONE_CACHE = True  # each mesh once
 E, I_Z, I_Y, AREA, L = 2.1e11, 0.03 * 0.02**3 / 12, 0.02 * 0.03**3 / 12, 0.03 * 0.02, 0.4
 
 
-def bar(condition="cantilever", count=4, family="in-plane-bending", interface=(), size=0.02):
+def bar(count=4, family="in-plane-bending", interface=()):
     modes = {"family": family, "attachment_modes": True} | ({"count": count} if count else {})
     keys = {"name": "bar", "modes": modes, "interface": list(interface)}
-    link = solid_link(L, rectangle(0.02, 0.03), {"size": size}, E=E, nu=0.3, rho=7850.0, condition=condition, **keys)
+    link = solid_link(L, rectangle(0.02, 0.03), {"size": 0.02}, E=E, nu=0.3, rho=7850.0, **keys)
     return ffrobot.make_link(link).body
-
-
-@pytest.mark.parametrize(
-    ("condition", "family"),
-    [("cantilever", ["in-plane-bending", "axial"]), ("cantilever", "all"), ("simply-supported", "in-plane-bending"),
-     ("simply-supported", "all")],
-)  # fmt: skip
-def test_flexibility_does_not_depend_on_the_number_of_modes(condition, family):
-    few, more = (bar(condition, count, family, size=0.04) for count in (2, 8))
-    expected = flexibility(more, "tip")
-    rows = [1, 5] if family != "all" else list(range(6))
-    if condition == "simply-supported":  # the forces across are the supports'
-        rows = [5] if family != "all" else [0, 3, 4, 5]
-    size = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))[np.ix_(rows, rows)]
-    assert np.abs((flexibility(few, "tip") - expected)[np.ix_(rows, rows)] / size).max() < 2e-6
-    for body in (few, more):
-        assert np.abs(body.modal_mass - np.eye(body.mode_count)).max() < 1e-12
-        assert np.abs(np.einsum("kkij->ij", body.S_bar_kl) - np.eye(body.mode_count)).max() < 1e-10
 
 
 def test_beam_theory():
