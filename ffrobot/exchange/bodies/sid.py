@@ -165,14 +165,14 @@ def _checks(modal: Modal, integrals: ShapeIntegrals) -> Iterator[str]:
             " and geometric stiffness would have in Cr alone: left out"
         )
     identities = (
-        ("Gr: its symmetric part", min(parts, key=lambda part: np.abs(part - slope).max()), slope, "the slope of J"),
+        ("Gr: symmetric part", min(parts, key=lambda part: np.abs(part - slope).max()), slope, "the slope of J"),
         ("Ct:", modal["Ct", (n, 3)].m0, integrals.S_bar.T, "the slope of mdCM"),
         ("Oe:", modal["Oe"].m0, integrals.centrifugal, "−½ and −1 times the slope of J"),
     )
     for name, given, expected, what in identities:
-        error = float(np.abs(given - expected).max(initial=0.0))
-        if error > 1e-6 * max(float(np.abs(expected).max(initial=0.0)), 1e-300):
-            yield f"{name} off {what} by {error:.2g}, of {np.abs(expected).max():.2g} at most"
+        error, scale = (np.abs(part).max() for part in (given - expected, expected))
+        if error > 1e-6 * scale:
+            yield f"{name} off {what} by {error:.2g}, of {scale:.2g} at most"
 
 
 MOST = 10**7  # entries of a matrix: a file that asks for more is damaged
