@@ -93,11 +93,12 @@ def link_sections(body: ModalBody) -> LinkSections:
 
 
 def check_sections(body: ModalBody, normal: Literal["y", "z"], *, twists: bool) -> None:
-    """Raise `InputError` where the modal body lacks the width of sections or, if patches twist it, their outline."""
-    if np.isnan(link_sections(body).extent(normal)).any():
+    """Raise `InputError` where the modal body lacks the size of sections or, if patches twist it, their outline."""
+    extent = link_sections(body).extent(normal)
+    if not (extent.any() and (extent >= 0.0).all()):  # False of NaN
         raise InputError(
-            "expected a modal body file with the width of the link (stations/width)",
-            "one of an earlier version: recompute it from its link file with `ffrobot link`",
+            "expected a modal body file with the height and width of stations",
+            "an imported or old one: compute it from a link file with `ffrobot link`",
         )
     if twists and body.stations.outline is None:
         raise InputError(

@@ -263,8 +263,10 @@ def test_patches_that_do_not_fit_their_link():
         with pytest.raises(InputError, match=r"width: expected patches on the face of the link, 0.014 m wide at 0"):
             link_patches([layout(**wide)], body, spatial)
     old = replace(body, stations=replace(body.stations, width=None, outline=None))
-    with pytest.raises(InputError, match="recompute it from its link file"):
-        link_patches([layout(bends="out-of-plane")], old, spatial)
+    imported = replace(body, stations=replace(body.stations, height=np.zeros_like(body.stations.height)))
+    for keys, without in (({"bends": "out-of-plane"}, old), ({}, imported)):
+        with pytest.raises(InputError, match="an imported or old one: compute it from a link file"):
+            link_patches([layout(**keys)], without, spatial)
     upright = link(SQUAT, 4, "out-of-plane-bending")
     for allocation in ("exact", "least-squares"):
         with pytest.raises(
