@@ -163,7 +163,7 @@ class UrdfOfScene:
         _add(inertial, "mass", value=part.mass)
         _add(inertial, "inertia", ixx=J[0, 0], ixy=J[0, 1], ixz=J[0, 2], iyy=J[1, 1], iyz=J[1, 2], izz=J[2, 2])
         modal = self._loaded[node.body.name].modal
-        if modal is not None and modal.kind == "beam":
+        if modal is not None and modal.stations.outline is not None:
             shapes = beam_visuals(modal, at)
         else:
             places = [place - at for place in _own_points(self._loaded[node.body.name]).values()]
