@@ -85,11 +85,6 @@ def revolute(name, first, second, **keys):
     return {"name": name, "type": "revolute", "between": (first, second), **keys}
 
 
-def random_state(rng, size, modal=0.1):
-    """Any q and v: positions and angles of order one, `modal` times as much in all of q."""
-    return modal * rng.standard_normal(size) + 0.5, rng.standard_normal(size)
-
-
 def always(_):
     """The progress of runs that nobody watches."""
     return True

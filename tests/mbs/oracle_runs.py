@@ -5,7 +5,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from mechanisms import always, random_state
+from mechanisms import always
 from moving_trees import state_of
 from scipy.integrate import simpson
 from tree_oracle import row_values, target_rates
@@ -145,11 +145,6 @@ def evaluated(robot, t, q, v):
     found = _core.tree_outputs(core, scene, [t], np.concatenate([q, v])[None])
     state = state_of(robot.model, np.array([t]), q[None], v[None], found.accelerations)
     return Seen(robot, replace(state, multipliers=system.multipliers(found.multipliers)))
-
-
-def random_tree_state(rng, robot, modal=0.1):
-    """Any q and v of the tree; rows may be violated."""
-    return random_state(rng, robot.model.tree.n_v, modal)
 
 
 def posture_of(robot, rng, modal=0.05):

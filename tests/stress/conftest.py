@@ -1,27 +1,13 @@
 """The option of stress tests, and beams of the paper's material."""
 
-import os
-
 import pytest
 from beam_links import modal_body, paper_link, rectangle
-from hypothesis import HealthCheck, settings
 
 from ffrobot.mbs.model.body import from_modal_body
 
 
 def pytest_addoption(parser):
     parser.addoption("--long", action="store_true", help="run stress tests that take minutes as well")
-
-
-def pytest_configure(config):
-    """Random scenes are the same every time in continuous integration (.ci/run), others in every other run.
-
-    One that fails is printed with the line `@reproduce_failure(…)` to paste above its test.
-    """
-    settings.register_profile(
-        "scenes", max_examples=150 if config.getoption("--nightly") else 15, deadline=None, database=None,
-        derandomize="CI" in os.environ, print_blob=True, suppress_health_check=list(HealthCheck),
-    )  # fmt: skip
 
 
 def pytest_collection_modifyitems(config, items):

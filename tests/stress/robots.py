@@ -3,7 +3,7 @@
 import numpy as np
 import rods
 from links import arm, ritz_link
-from mechanisms import forward, make_model, pcid, revolute
+from mechanisms import forward, pcid
 from oracle_runs import energies, run
 from rods import CRANK, ROD, rod
 
@@ -40,19 +40,6 @@ def through_dead_centre(speed):
     """The slider's way for a crank that turns evenly, from 0.9 rad through 0."""
     phi = f"(0.9-{speed}*t)"
     return {"name": "slider", "point": "slider.pin", "x": f"{CRANK}*cos{phi}+sqrt({ROD**2}-{CRANK**2}*sin{phi}**2)"}
-
-
-def parallelogram(cranks=2, *, flexible=True, angle=0.9, trajectory=()):
-    """Cranks of length 1 side by side under one coupler: two move freely, a third fits only as long as the others."""
-    names = ("left", "right", "mid")[:cranks]
-    feet = {"left": (0.0, 0.0), "right": (1.0, 0.0), "mid": (0.5, 0.0)}
-    heads = {"left": "top.root", "right": "top.tip", "mid": "top.mid"}
-    make = (lambda name: ritz_link(name, "simply-supported")) if flexible else (lambda name: rod(name, 1.0, 1.0))
-    joints = [revolute(f"{name} foot", "ground", f"{name}.root", at=feet[name]) for name in names]
-    joints += [revolute(f"{name} head", f"{name}.tip", heads[name]) for name in names]
-    angles = dict.fromkeys(names, angle) | {"top": 0.0}
-    bodies = [make(name) for name in (*names, "top")]
-    return make_model(bodies, joint=joints, trajectory=trajectory, initial={"angles": angles})
 
 
 def energy_drift(outcome):

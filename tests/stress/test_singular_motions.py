@@ -5,7 +5,7 @@ import pytest
 from links import arm_links
 from mechanisms import make_model, relative, revolute
 from oracle_runs import joint_forces
-from robots import free_run, inverse, parallelogram, reaching, slider_crank, through_dead_centre
+from robots import free_run, inverse, reaching, slider_crank, through_dead_centre
 from rods import rod
 from tree_oracle import target_rates
 
@@ -74,18 +74,6 @@ def test_starts_at_dead_centre():
         inverse(slider_crank(path, angle=0.0))
     for text in ("initial:", 'trajectory "slider"', "found a singular one"):
         assert text in str(raised.value)
-
-
-def test_parallelogram_turns_flat():
-    path = {"name": "crank", "angle": "left", "value": "0.9-2*t"}
-    t = ends(lambda: inverse(parallelogram(trajectory=[path])), 'loops that "right head" close', "drive a joint")
-    assert t == pytest.approx(0.45, abs=1e-4)
-
-
-def test_third_crank_of_flexible_links():
-    outcome = free_run(parallelogram(3), end=0.3, tolerance=1e-4)
-    outcome.check_completed()
-    assert off_rows(outcome) < 1e-11
 
 
 def test_welded_twice():
