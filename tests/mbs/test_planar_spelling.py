@@ -1,8 +1,7 @@
-"""Planar scenes read by the records of 3D: components, axes, angles; keys of the other space are unknown."""
+"""Planar scenes read by the records of 3D: components, axes, angles; what is unknown there: test_scene_file.py."""
 
 import pytest
 
-from ffrobot.common.errors import InputError
 from ffrobot.scene.load import make_scene
 
 
@@ -59,23 +58,3 @@ def test_bodies_without_angles_follow_guesses_of_joints():
     joints = {joint.name: joint for joint in found.joint}
     assert found.initial.joints == pytest.approx({"root": 0.3, "way": 0.1, "elbow": 0.3 - 0.7})
     assert joints["hold"].rpy == pytest.approx((0.0, 0.0, 0.0))  # the tool follows what it is welded to
-
-
-@pytest.mark.parametrize(
-    ("changes", "line"),
-    [
-        ({"gravity": [0.0, 0.0, -9.81]}, "gravity: expected at most 2 entries, found [0.0, 0.0, -9.81]"),
-        ({"load": [{"point": "tool.a", "mz": "t"}]},
-         "load no. 1: mz: expected one of the keys point, joint, pzt, x, y, moment, "),
-        ({"joint": [{"name": "j", "type": "screw", "between": ["ground", "lower.a"]}]},
-         'joint "j": type: expected "revolute", "prismatic" or "weld", found "screw"'),
-        ({"joint": [{"name": "j", "type": "revolute", "between": ["ground", "lower.a"], "axis": [0.0, 0.0, 1.0]}]},
-         'joint "j": expected the key "axis" only in prismatic joints, found it in a revolute joint'),
-        ({"payload": [{"point": "upper.b", "mass": 0.5, "inertia": [1.0, 1.0, 1.0]}]},
-         "payload no. 1: inertia: expected a number, found [1.0, 1.0, 1.0]"),
-    ],
-)  # fmt: skip
-def test_what_only_3d_has_is_no_key_of_the_plane(changes, line):
-    with pytest.raises(InputError) as caught:
-        read(**changes)
-    assert line in str(caught.value)

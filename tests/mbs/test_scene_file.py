@@ -149,6 +149,7 @@ MISTAKES = [
     ("gravity", "gravty", "gravty: expected one of the keys name, space, gravity, ", '(did you mean "gravity"?)'),
     ("[0.0, -9.81]", '"down"', 'gravity: expected a list, found "down"', ""),
     ("[0.0, -9.81]", "[0.0, nan]", "gravity[1]: expected a finite number, found ", ""),
+    ("[0.0, -9.81]", "[0, 0, -9.81]", "gravity: expected at most 2 entries, found [0, 0, -9.81]", ""),
     ('"planar"', '"plane"', 'space: expected "planar" or "spatial", found "plane"', '"planar"?'),
     ("[[payload]]", "[[paylod]]", "paylod: expected one of the keys", '(did you mean "payload"?)'),
     ("[initial]", "[[initial]]", "initial: expected a table, found [", ""),
@@ -164,6 +165,7 @@ MISTAKES = [
     ('name = "hand"', 'name = "ground"', 'body "ground": name: expected any other name', 'found "ground"'),
     # joints
     ('"weld"', '"wled"', 'joint "W": type: expected "revolute", "prismatic" or "weld", found "wled"', '"weld"?'),
+    ('"weld"', '"screw"', 'joint "W": type: expected "revolute", "prismatic" or "weld", found "screw"', ""),
     ('"weld"', '"weld"\nmotor = true', 'joint "W": expected no motor', "found motor = true"),
     *(
         ('"weld"', f'"weld"\n{key} = 1.0', 'joint "W": ', f'"{key}" only in revolute or prismatic joints, found it in a weld')
@@ -202,6 +204,8 @@ MISTAKES = [
     ('pzt = "link1"', 'pzt = "link2"', 'load no. 1: pzt: expected one of the layouts "link1", found "link2"', ""),
     ('["10*t", 5]', '["10*t", "v"]', "load no. 1: voltage[1]: expected an expression in t, found 'v'", "unknown name"),
     ('pzt = "link1"', 'joint = "O"', 'load no. 1: expected the keys "moment" with "joint", found "voltage"', ""),
+    ("mass = 0.5", "mass = 0.5\ninertia = [1, 1, 1]", "payload no. 1: inertia: expected a number, found [1, 1, 1]", ""),
+    ('voltage = ["10*t", 5]', 'mz = "t"', "load no. 1: mz: expected one of the keys point, joint, pzt, x, y, moment, ", ""),
     ("mass = 0.5", "", "payload no. 1: mass: expected a value, since this key is required, found none", ""),
     # analyses
     ("end = 1.0", "end = 1.0005", 'analysis "inverse": expected an output_step that divides end = 1.0005', "found 0.001"),

@@ -32,6 +32,7 @@ CLOSED_FORMS = [
     ("3 - (t - 2)/-8", lambda t: (3 + (t - 2) / 8, 0.125, 0.0)),
     ("7*(1 + t**2/3)", lambda t: (7 + 7 * t * t / 3, 14 * t / 3, 14 / 3)),
     ("abs(-t)", lambda t: (t, 1.0, 0.0)),
+    ("30*deg + 750*mm*t", lambda t: (math.pi / 6 + 0.75 * t, 0.75, 0.0)),
     ("where(t < 1, t, t**2)", lambda t: (t, 1.0, 0.0) if t < 1 else (t**2, 2 * t, 2.0)),
 ]  # fmt: skip
 w = math.pi / 4
@@ -117,11 +118,6 @@ def test_constants_among_themselves_mean_what_they_do_with_t():
     """Folded when the expression is read; the same with a zero that depends on t."""
     folded, not_folded = (f"1 + (cos(pi/4 + {zero}) - sqrt(3 + {zero})/2)*t**(1 + {zero} + 1)" for zero in ("0", "0*t"))
     np.testing.assert_array_equal(parse_expression(folded)(1.7), parse_expression(not_folded)(1.7))
-
-
-def test_units_are_factors():
-    assert parse_expression("30*deg")(0.0)[0] == pytest.approx(math.radians(30), rel=1e-15)
-    assert parse_expression("750*mm*t")(2.0)[:2] == pytest.approx((1.5, 0.75), rel=1e-15)
 
 
 BAD_EXPRESSIONS = [
