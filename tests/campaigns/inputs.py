@@ -1,8 +1,8 @@
-"""URDF, meshes, motions, tables, HDF5 files, arguments of studies, one change each: refused, or taken.
+"""Meshes, motions, tables, HDF5 files, arguments of studies, one change each: refused, or taken.
 
     python tests/campaigns/inputs.py [--count 100] [--seed 0] [--kind KIND …] [--record]
 
-Kinds are urdf, skin, mesh, motion, bag, csv, modal, results, bytes, study, catalog and controller.
+Kinds are skin, mesh, motion, bag, csv, modal, results, bytes, study, catalog and controller.
 
 Run by hand, some 0.3 s each. Attributes, cells and datasets get values of other types, huge, tiny, not finite, empty,
 names that lead elsewhere, and text that programs would run: a file CANARY must not appear, nor anything beside the
@@ -16,7 +16,6 @@ import sys
 import tempfile
 from collections import Counter
 from pathlib import Path
-from xml.etree import ElementTree
 
 sys.path.append(str(Path(__file__).parents[1] / "mesh"))
 import gmsh
@@ -32,8 +31,6 @@ from record import options, record
 from ffrobot.common.checksum import seal
 from ffrobot.mesh.gmsh_session import gmsh_session
 
-ROOT = Path(__file__).parents[2]
-ROBOTS = ROOT / "tests" / "exchange" / "robots"
 NUMBERS = tuple(
     "0 -1 1e-320 1e300 -1e29 18446744073709551616 999999999999999999999 nan inf 1,5 0x10 1_0 180 1e9".split(" ")  # noqa: SIM905
 )
@@ -149,20 +146,6 @@ class Campaign:
                     f"{number} {kind} {found} {command[0]}, exit code {code}: {label}: {told.strip()[-500:]}"
                 )
                 print(self.bad[-1], flush=True)
-
-    def urdf(self):
-        root = ElementTree.parse(self.draw.choice(sorted(ROBOTS.glob("*.urdf")))).getroot()
-        parents = {child: parent for parent in root.iter() for child in parent}
-        element, how = self.draw.choice(list(parents)), self.draw.choice(("value", "value", "value", "drop", "double"))
-        if how == "drop":
-            parents[element].remove(element)
-        elif how == "double" or not element.attrib:
-            parents[element].append(element)
-        else:
-            element.set(self.draw.choice(list(element.attrib)), self.draw.choice(TEXTS).replace("\0", ""))
-        (self.place / "robot.urdf").write_bytes(ElementTree.tostring(root))
-        options = ["--fix-inertia"] if self.draw.random() < 0.3 else []
-        return f"{how} {element.tag} {element.attrib}", "robot.urdf", [["import", "robot.urdf", "-o", "out", *options]]
 
     def skin(self):
         """A mesh that a robot shows, and whose filled volume can be its mass."""
@@ -290,7 +273,7 @@ class Campaign:
 
 
 KINDS = (
-    "urdf", "skin", "mesh", "motion", "bag", "csv", "modal", "results", "bytes", "study", "catalog", "controller",
+    "skin", "mesh", "motion", "bag", "csv", "modal", "results", "bytes", "study", "catalog", "controller",
 )  # fmt: skip
 
 
