@@ -1,22 +1,11 @@
-"""Rotors behind gears and friction in joints: moments in closed form, and what equilibria leave out."""
+"""Rotors behind gears: moments in closed form."""
 
 import numpy as np
-import pytest
-from links import arm
-from mechanisms import checked_scene, make_model, pcid, relative, revolute
+from mechanisms import make_model, pcid, relative, revolute
 from oracle_runs import joint_forces, run
 from rods import rod
 
 from ffrobot.mbs.analysis.fcid import Fcid
-from ffrobot.mbs.analysis.operating_points import Static
-
-GEARED = {"gear_ratio": 60.0, "rotor_inertia": 2e-4}
-FRICTION = {"viscous_friction": 0.3, "coulomb_friction": 0.5, "friction_speed": 0.05}
-
-
-def geared_arm(links=None, first=GEARED, second=GEARED, **keys):
-    joints = [revolute("O", "ground", "link1.root", **first), revolute("A", "link1.tip", "link2.root", **second)]
-    return arm(links, joint=joints, **keys)
 
 
 def test_geared_two_link_arm_needs_the_moments_of_spong():
@@ -49,18 +38,3 @@ def test_geared_two_link_arm_needs_the_moments_of_spong():
         for joint, expected in (("O", J1 * N1**2 * alpha + rotor), ("A", N2 * rotor)):
             added = joint_forces(geared, joint).motor - joint_forces(bare, joint).motor
             assert relative(added, expected) < 1e-9, (kind, joint)
-
-
-def test_equilibrium_knows_neither_rotors_nor_friction():
-    static, keys = Static(name="static", kind="static"), {"motors": "section"}
-    with_them = run(geared_arm(None, GEARED | FRICTION, GEARED | FRICTION, **keys), static)
-    without = run(geared_arm(None, {}, {}, **keys), static)
-    np.testing.assert_allclose(with_them.q, without.q, atol=1e-12)
-    np.testing.assert_allclose(with_them.tau, without.tau, rtol=1e-9)
-
-
-@pytest.mark.parametrize(("closed", "driven"), [(False, ["O", "A"]), (True, [])])
-def test_motors_are_in_all_joints_of_open_chains(closed, driven):
-    joints = [revolute("O", "ground", "a.root"), revolute("A", "a.tip", "b.root")]
-    scene = checked_scene(joints + [revolute("B", "b.tip", "ground", at=(1.0, 0.0))] * closed, bodies=("a", "b"))
-    assert [joint.name for joint in scene.motor_joints] == driven

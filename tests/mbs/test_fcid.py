@@ -7,7 +7,6 @@ from links import arm, arm_links, quintic, ritz_link
 from mechanisms import make_model, relative, revolute
 from oracle_runs import run
 from patch_sets import Patches
-from rods import rod
 
 from ffrobot.common.errors import InputError, SolveError
 from ffrobot.mbs.analysis.fcid import Fcid
@@ -99,12 +98,6 @@ def test_static_shape_sags_as_in_closed_form():
     np.testing.assert_allclose(sag, -mass * 9.81 / (8 * EI), rtol=1e-9)
     np.testing.assert_allclose(outcome.tau, mass * 9.81 / 2, rtol=1e-9)
     assert np.abs(outcome.F_p).max() < 1e-11 * mass * 9.81
-
-
-def test_rigid_links_have_one_shape():
-    links = [rod("link1", 1.0, 1.0), rod("link2", 1.0, 1.0)]
-    zero, static = (run(arm(links), fcid(shape)) for shape in ("zero", "static"))
-    np.testing.assert_array_equal(static.tau, zero.tau)
 
 
 LIFT = [{"name": "lift", "point": "link2.tip", "y": quintic(1.3, 1.5)}]

@@ -14,7 +14,6 @@ from ffrobot.mbs.fields.paths import (
     law_in,
     law_within,
     path_of,
-    polynomial_law,
 )
 
 LAWS = [("rest-to-rest", 2), ("rest-to-rest", 4), ("s-curve", 2), ("s-curve", 4), ("trapezoid", 1)]
@@ -72,11 +71,6 @@ def test_limits_are_kept_and_one_is_reached(profile, smoothness, distance):
 def test_s_curve_takes_the_time_of_the_textbook(distance, duration):
     """Biagiotti and Melchiorri 2008, sec. 3.4."""
     assert law_within(distance, PathLimits(1.5, 6.0, 50.0), "s-curve", 2).end == pytest.approx(duration, rel=1e-12)
-
-
-def test_polynomial_of_smoothness_2_is_the_quintic():
-    t = np.linspace(0, 1, 31)
-    np.testing.assert_allclose(polynomial_law(2).sample(t)[:, 0], t**3 * (10 - 15 * t + 6 * t**2), atol=1e-15)
 
 
 def test_path_stops_at_its_places_and_holds_there():
