@@ -221,7 +221,7 @@ class Bending:
     foreshortening: float  # ½∫w'² dx over its length, in its own frame, m
     # N·m, foreshortening times the largest force at an interface at the same time: the error of moments
     foreshortening_moment: float
-    # by the loads of the run, relative, of the shape where it is largest; 0 without data in the modal body file
+    # by the loads of the run, relative, of the shape where it is largest; NaN without data in the modal body
     stiffness_change: float
     length: float  # m, of the link
     is_stiffened: bool  # whether geometric stiffening is in the equations
@@ -304,8 +304,9 @@ def _bending_of(run: Run, name: str, link: ModalBody, sizes: Mapping[str, Array]
     deflection, rotation, shortening = shape_from_chord(link, p)
     peaks = (deflection / link.length, rotation, shortening, force * shortening)
     w, phi, s, moment = (float(x.max(initial=0.0)) for x in peaks)
-    change, buckling, missing = 0.0, 0.0, Missing(0.0, 0.0)
-    if body.n_modes:
+    unknown = 0.0 if link.geometric_stiffness or not body.n_modes else np.nan
+    change, buckling, missing = unknown, 0.0, Missing(unknown, unknown)
+    if body.n_modes and link.geometric_stiffness:
         on_modes = lasting(_on_modes(link, run, node, sizes), run.time)
         change, buckling = stiffness_change(on_modes)
         if body.stiffening is not None:
@@ -334,7 +335,7 @@ def _on_modes(link: ModalBody, run: Run, node: Node, sizes: Mapping[str, Array])
     points = {
         point: LoadedPoint(
             at.position,
-            np.vstack([at.translation, at.rotation]) @ T,
+            at.motion @ T,
             np.stack([K.get(load, np.zeros((n, n))) for load in interface_load_names([point])]),
         )
         for point, at in link.interfaces.items()
@@ -382,6 +383,8 @@ def deflection_warning(bodies: Mapping[str, Bending]) -> str:
 
 
 def _percent(value: float) -> str:
+    if np.isnan(value):
+        return "an unknown share"
     return f"{100 * value:.0f} %" if value >= 1.0 else f"{100 * value:.2g} %"
 
 

@@ -118,6 +118,10 @@ def test_a_key_that_is_neither_true_nor_false_nor_auto():
 
 
 def test_files_without_geometric_stiffness_are_named(tmp_path):
+    """Without it in the equations, errors are not known, rather than 0."""
     write_modal_body(tmp_path / "blade.h5", replace(ffrobot.make_link(link()).body, geometric_stiffness={}))
+    body = [{"name": "blade", "modal": str(tmp_path / "blade.h5")}]
     with pytest.raises(ffrobot.InputError, match=r'geometric_stiffening: expected modal bodies .* of "blade"'):
-        solve(**blade(body=[{"name": "blade", "modal": str(tmp_path / "blade.h5")}]))
+        solve(**blade(body=body))
+    with solve(**blade(body=body, geometric_stiffening=False)) as results:
+        assert np.isnan(results.attributes("turning/bodies/blade")["position_error"])
