@@ -22,8 +22,8 @@ READ = (".3mf", ".dae", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
 def loaded_skin(path: Path, scale: Sequence[float], d: Array, C: Array) -> trimesh.Trimesh:
     """Read the mesh in `path`, turned by C (3, 3) and moved by d (3,), m.
 
-    Coordinates times `scale` (3,) are in m, or in the unit that the file states. Raises `ModuleNotFoundError` without
-    trimesh, `InputError` if the file is missing, damaged or of another format.
+    Coordinates times `scale` (3,) are in m, or in the file's unit. Raises `ModuleNotFoundError` without trimesh,
+    `InputError` if the file is missing, damaged or of another format.
     """
     import trimesh
 
@@ -31,7 +31,7 @@ def loaded_skin(path: Path, scale: Sequence[float], d: Array, C: Array) -> trime
         raise InputError(f"expected a mesh in one of {', '.join(READ)}", path.name)
     try:
         loaded = trimesh.load(path, force="mesh")
-        if loaded.units:  # of DAE and 3MF
+        if loaded.units:
             loaded.convert_units("meters")
         loaded.merge_vertices(merge_tex=True, merge_norm=True)  # of faces that meet with several normals
     except ModuleNotFoundError:

@@ -95,10 +95,10 @@ def link_sections(body: ModalBody) -> LinkSections:
 def check_sections(body: ModalBody, normal: Literal["y", "z"], *, twists: bool) -> None:
     """Raise `InputError` where the modal body lacks the size of sections or, if patches twist it, their outline."""
     extent = link_sections(body).extent(normal)
-    if not (extent.any() and (extent >= 0.0).all()):  # False of NaN
+    if not (extent.any() and (extent >= 0.0).all()):
         raise InputError(
-            "expected a modal body file with the height and width of stations",
-            "an imported or old one: compute it from a link file with `ffrobot link`",
+            "expected a modal body file with height and width of stations",
+            "an imported or old one: compute it from a link file by `ffrobot link`",
         )
     if twists and body.stations.outline is None:
         raise InputError(

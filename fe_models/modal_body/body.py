@@ -233,7 +233,7 @@ def _inertia(body: ModalBody) -> Iterator[str]:
 
 def _positive(name: str, matrix: Array, scale: float = 1.0) -> Iterator[str]:
     lowest = np.linalg.eigvalsh((matrix + matrix.swapaxes(-1, -2)) / 2).min(initial=0.0)
-    if not lowest >= -POSITIVE_TOLERANCE * scale:  # nor NaN of large numbers
+    if not lowest >= -POSITIVE_TOLERANCE * scale:  # nor NaN
         yield f"{name}: expected no negative eigenvalue, found {lowest:.3g}"
 
 

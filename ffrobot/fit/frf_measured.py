@@ -38,7 +38,7 @@ class Column(NamedTuple):
     values: ComplexArray
     coherence: Array | None
     order: int | None = None  # of the time derivative: 0 receptance, 1 mobility, 2 accelerance
-    is_si: bool = False  # whether the file's units are SI's, by their label, if any, and dataset 164
+    is_si: bool = False  # whether label and dataset 164, if any, are SI's
 
 
 def read_columns(path: Path) -> list[Column]:

@@ -90,7 +90,7 @@ def read_recording(path: Path, scene: Scene, *, is_in_degrees: bool = False) -> 
             f"none of {quoted(missing)} among {quoted(record.columns)}{did_you_mean(missing[0], record.columns)}",
         )
     if is_in_degrees and record.units:
-        raise InputError(f"{path}: --degrees: expected a header without units", quoted(dict.fromkeys(record.units)))
+        raise InputError(f"{path}: --degrees: expected a header without units", quoted(record.units))
     scale = np.array([1 / TURN if is_in_degrees and joint.units[0] == "rad" else 1.0 for joint in joints])
     values = record.values[:, columns] * scale
     if not is_in_degrees:

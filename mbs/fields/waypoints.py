@@ -128,7 +128,7 @@ class Recorded:
     place: Callable[[int], str]
     remarks: tuple[str, ...] = ()
     rates: Array | None = None
-    units: tuple[str, ...] = ()  # in the header
+    units: tuple[str, ...] = ()
 
     def waypoints(self) -> Waypoints:
         """Return the rows as waypoints with remarks on odd entries; a row that repeats the one before is left out.
@@ -192,7 +192,7 @@ def load_record(path: Path) -> Recorded:
     names, values, units = columns[1:], table[:, 1:], list[str]()
     for k, name in enumerate(names):
         match = UNIT.fullmatch(name)
-        if match is not None and (unit := match[2] or match[3]) in FACTORS:
+        if match and (unit := match[2] or match[3]) in FACTORS:
             names[k], values[:, k] = match[1], FACTORS[unit] * values[:, k]
             units.append(unit)
             if FACTORS[unit] != 1.0:
