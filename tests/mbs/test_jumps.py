@@ -48,6 +48,12 @@ def test_moments_that_jump(jumps, integrator):
     assert relative(outcome.q[:, 2], angle) < 1e-12
 
 
+def test_a_jump_beside_an_output():
+    """Behind 0.35 and at 35 · 0.01, the next number: no step goes from one to the other."""
+    outcome = free_run(driven_rod(f"where(t > 0.35, {MOMENT}, 0)"), tolerance=1e-8, integrator="radau")
+    assert relative(outcome.q[:, 2], angle_behind([(0.35, 1)], outcome.time)) < 1e-12
+
+
 def test_a_jump_costs_a_search():
     """Some fifty evaluations, not a walk towards it: DOP853 takes eleven a step."""
     free = free_run(driven_rod(f"{MOMENT}"), tolerance=1e-6, integrator="dop853")

@@ -289,6 +289,7 @@ private:
     if (limit_watch_)
       limit_watch_->look(*method_, methods_.at_work(), t_, z_.data(), attempt.step);
     move_to_end(attempt);
+    delivery_.outputs_at(at_once(), z_.data()); // also those that round-off puts behind it
     if (controls_.keep_steps)
       report_.step_ends.push_back(t_);
     if (!system_.is_sensible(z_.data()))
@@ -337,7 +338,7 @@ private:
   // True where loads have jumped at t.
   bool pass_breaks() {
     const std::size_t before = next_break_;
-    while (breaks_ && next_break_ < breaks_->times.size() && breaks_->times[next_break_] <= t_) {
+    while (breaks_ && next_break_ < breaks_->times.size() && breaks_->times[next_break_] <= at_once()) {
       breaks_->at(next_break_, t_, state(z_.data()));
       ++next_break_;
     }
