@@ -62,8 +62,9 @@ def stops(
             last = np.diff(breaks)
             is_far = way * duration > ENDS.far * last * way.max(initial=0.0)
             at.append(_parts(breaks, (last < ENDS.brief * duration) & is_far))
-    # just before loads jump, too: a mean over time is by the values on both sides
-    at += [np.array(load.switches()) - ENDS.shortest * duration for load in loads]
+    jumps = [np.append(load.switches(), _jumps(load, ends)) for load in loads]
+    # just before them, too: means over time are by the values on both sides
+    at += jumps + [each - ENDS.shortest * duration for each in jumps]
     if is_driven and duration > 0.0:
         grid = np.union1d(_even(ends), np.concatenate(at))
         at += [np.setdiff1d(_resolved(function, grid, ENDS.seen), grid) for function in (*targets, *loads)]
@@ -110,6 +111,20 @@ def _humps(function: TimeFunction, ends: Array) -> Array:
     about = np.convolve(leaving, np.ones(5))[1:-1] > 0
     about &= np.histogram(function.switches(), times[:: ENDS.dense])[0] == 0
     return times[:-1][np.repeat(about, ENDS.dense)]
+
+
+def _jumps(load: TimeFunction, ends: Array) -> Array:
+    """Times (n,) s behind jumps of a load, but at its switches."""
+    a = np.linspace(ends[0], ends[1], ENDS.intervals * ENDS.dense + 1)
+    at = misfits(load, a, 0) > ENDS.hump * np.ptp(load.sample(a)[0])
+    at &= np.histogram(load.switches(), a)[0] == 0
+    a, b = a[:-1][at], a[1:][at]
+    left, right = load.sample(a)[0], load.sample(b)[0]
+    for _ in range(ENDS.rounds):
+        middle = (a + b) / 2
+        value = load.sample(middle)[0]
+        a, b = np.where(np.abs(value - left) < np.abs(value - right), (middle, b), (a, middle))
+    return b[2 * np.abs(load.sample(b)[0] - load.sample(a)[0]) > np.abs(right - left)]
 
 
 def _bends(target: TimeFunction, grid: Array) -> Array:

@@ -101,6 +101,13 @@ def test_moments_that_come_and_go_while_nothing_moves(integrator, width):
             assert hump.v[-1, 2] == pytest.approx(MOMENT / INERTIA * width / 2, rel=1e-3)
 
 
+@pytest.mark.parametrize("integrator", ["dop853", "radau"])
+def test_a_train_of_pulses(integrator):
+    """Of a moment that the sine of a kilohertz switches, a third of the time: all pulses count, no sample sees them."""
+    outcome = free_run(driven_rod(f"where(sin(2000*pi*t) > 0.5, {MOMENT}, 0)"), tolerance=1e-3, integrator=integrator)
+    assert outcome.v[-1, 2] == pytest.approx(outcome.time[-1] / 3 * MOMENT / INERTIA, rel=1e-8)
+
+
 def test_steep_load_is_no_jump():
     """Steps go through it; its integral is that of a jump."""
     outcome = free_run(driven_rod(f"{MOMENT}*(1+tanh((t-0.5)/1e-5))/2"), tolerance=1e-8, integrator="dop853")
