@@ -20,7 +20,7 @@ from ..model.body import Body
 from ..model.gears import refuse_prescribed_motors
 from ..model.model import Model
 from ..model.system import MultibodySystem, driven_mechanism, fastest_mechanism
-from ..posture.posture import shape_in_redundant_loops
+from ..posture.posture import check_smooth, shape_in_redundant_loops
 from ..posture.prescribed import PrescribedMotion, left_slopes, prescribed_motion
 from ..run.context import Context
 from ..run.record import Prescription, Run, Statistics
@@ -73,6 +73,8 @@ class Fcid(TimedAnalysis):
         posture, or no static shape, is found.
         """
         refuse_prescribed_motors(context.model, self)
+        given = ((f'analysis "{self.name}": {key}', function) for key, function, _ in self.prescribed())
+        check_smooth(context.model, self.end, given)
         path = context.path
         assert path is not None
         model, q, freedom = path.model, path.state.q, path.mobility.freedom

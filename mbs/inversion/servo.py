@@ -171,9 +171,7 @@ def make_servo(model: Model, end: float, goes_on: Callable[[], bool], kind: str 
         raise InputError(
             f'expected at least one flexible body for kind = "{kind}"', 'only rigid ones: use kind = "pcid"'
         )
-    for path in model.scene.trajectory:
-        targets = ((f'trajectory "{path.name}": {name}', target) for name, target in path.targets)
-        check_smooth(model.scene.path, targets, end)
+    check_smooth(model, end)
     if not goes_on():
         raise Stopped
     times = np.linspace(0.0, end, POSTURES)

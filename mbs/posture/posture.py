@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -183,8 +182,8 @@ def check_path(model: Model, q: Array, end: float) -> Iterator[str]:
     """
     path, free = model.scene.path, mobility(model, q)
     bent, locked = paths_by_bending(model, q)
-    for each in model.scene.trajectory if end > 0 else ():
-        check_smooth(path, ((f'trajectory "{each.name}": {name}', target) for name, target in each.targets), end)
+    if end > 0:
+        check_smooth(model, end)
     rows = int(np.count_nonzero(~model.loop_rows))
     names = quoted(trajectory.name for trajectory in model.scene.trajectory)
     if rows > free.freedom and bent:
@@ -241,18 +240,19 @@ SMOOTH = 0.1  # of that: what misses less in one of those intervals has no jump
 RESTING = 1e-6  # of the largest value, within the run: a path that moves less stands still, and what jumps is round-off
 
 
-def check_smooth(path: Path, targets: Iterable[tuple[str, TimeFunction]], end: float) -> None:
-    """Raise `InputError` for one of `targets` (label, function) that jumps in value or velocity from t = 0 to `end`, s.
+def check_smooth(model: Model, end: float, shape: Iterable[tuple[str, TimeFunction]] = ()) -> None:
+    """Raise `InputError` for trajectories, or labels with functions of `shape`, that jump in value or velocity.
 
-    `path` is the scene's file. Accelerations may jump.
+    From t = 0 to `end` (s); accelerations may jump.
     """
-    for label, target in targets:
+    paths = ((f'trajectory "{each.name}": {of[0]}', of[1]) for each in model.scene.trajectory for of in each.targets)
+    for label, target in (*paths, *shape):
         for order, quantity in enumerate(("value", "velocity")):
             jump = _jump(target, end, order)
             if jump is not None:
                 t, before, after = jump
                 raise InputError(
-                    f"{path}: {label}: expected a continuous {quantity}",
+                    f"{model.scene.path}: {label}: expected a continuous {quantity}",
                     f"a jump from {before:.6g} to {after:.6g} at t = {t:.9g} s: no finite force can make the robot"
                     " follow; round it off (waypoints make a smooth curve)",
                 )

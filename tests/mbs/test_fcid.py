@@ -115,3 +115,9 @@ LIFT = [{"name": "lift", "point": "link2.tip", "y": quintic(1.3, 1.5)}]
 def test_shapes_that_do_not_go(made, analysis, said):
     with pytest.raises((InputError, SolveError), match=said):
         run(made(), analysis)
+
+
+def test_shapes_that_no_force_can_follow_are_refused():
+    modal = {"link2": (parse_expression("1e-4*where(t < 0.1, 0, t - 0.1)"),)}
+    with pytest.raises(InputError, match=r'"fcid": modal.link2\[0\]: expected a continuous velocity, found a jump'):
+        run(arm(), fcid("given", modal=modal))
