@@ -20,14 +20,16 @@ from ..model.body import Body
 from ..model.gears import refuse_prescribed_motors
 from ..model.model import Model
 from ..model.system import MultibodySystem, driven_mechanism, fastest_mechanism
-from ..posture.posture import check_smooth, shape_in_redundant_loops
+from ..posture.posture import check_smooth, misfits, shape_in_redundant_loops
 from ..posture.prescribed import PrescribedMotion, left_slopes, prescribed_motion
 from ..run.context import Context
 from ..run.record import Prescription, Run, Statistics
 from ..scene.analysis import Check, TimedAnalysis
 
 ZERO = TimeFunction.constant(0.0)
-FEWEST_NODES = 201  # of the spline through a static shape; half as many as outputs where that is more
+FEWEST_NODES = 201  # of the spline through a shape; half as many as outputs where that is more
+DOUBLINGS = 7  # of them
+ROUGH = 3e-3  # of the largest acceleration, by trapezoids
 
 Bodies = Sequence[Body]
 
@@ -119,12 +121,11 @@ def _shape(context: Context, analysis: Fcid, model: Model, motion: PrescribedMot
     path, whole = context.model.scene.path, context.whole
     bodies = [node.body for node in context.model.tree.nodes]
     if analysis.shape == "given" and whole is not None:
-        nodes, links = shape_nodes(analysis), [node.body for node in whole.model.tree.nodes]
+        links = [node.body for node in whole.model.tree.nodes]
         counts = {body.name: body.n_modes for body in bodies}
         shape = dict(zip((link.name for link in links), given_shape(path, links, analysis), strict=True))
         for name, link in whole.divided.items():
-            p = np.column_stack([function.sample(nodes)[0] for function in shape[name]])
-            of_pieces = iter(spline(nodes, p @ link.spread.T))
+            of_pieces = iter(_sums(analysis, link.spread, shape[name]))
             shape |= {piece: [next(of_pieces) for _ in range(counts[piece])] for piece in link.bodies}
         return [shape[body.name] for body in bodies]
     if analysis.shape == "given":
@@ -134,9 +135,14 @@ def _shape(context: Context, analysis: Fcid, model: Model, motion: PrescribedMot
     return [[ZERO] * body.n_modes for body in bodies]
 
 
-def shape_nodes(analysis: Fcid) -> Array:
-    """Times (T,), s, at which splines through shapes have nodes."""
-    return np.linspace(0.0, analysis.end, max(FEWEST_NODES, len(analysis.times) // 2 + 1))
+def _nodes(analysis: Fcid, functions: Sequence[TimeFunction]) -> Array:
+    """Times (T,), s, that resolve accelerations of `functions`; the fewest where these jump."""
+    fewest = max(FEWEST_NODES, len(analysis.times) // 2 + 1)
+    for k in range(DOUBLINGS):
+        nodes = np.linspace(0.0, analysis.end, (fewest - 1) * 2**k + 1)
+        if all(misfits(of, nodes, 1).max() <= ROUGH * nodes[1] * np.abs(of.sample(nodes)[2]).max() for of in functions):
+            return nodes
+    return np.linspace(0.0, analysis.end, fewest)
 
 
 def sampled(shape: Shape, times: Array) -> Array:
@@ -164,15 +170,20 @@ def given_shape(scene_path: Path, bodies: Bodies, analysis: Fcid) -> Shape:
         if np.array_equal(body.modal_transform, np.eye(in_file)[:, selected]):
             shape.append([functions[k] for k in selected])
         else:
-            nodes = shape_nodes(analysis)
-            p = np.column_stack([function.sample(nodes)[0] for function in functions])
-            shape.append(spline(nodes, np.linalg.lstsq(body.modal_transform, p.T, rcond=None)[0].T))
+            shape.append(_sums(analysis, np.linalg.pinv(body.modal_transform), functions))
     return shape
+
+
+def _sums(analysis: Fcid, weights: Array, functions: list[TimeFunction]) -> list[TimeFunction]:
+    """Splines through sums of `functions` (n,) by `weights` (k, n)."""
+    nodes = _nodes(analysis, functions)
+    return spline(nodes, sampled([functions], nodes)[0] @ weights.T)
 
 
 def _static(model: Model, bodies: Bodies, analysis: Fcid, motion: PrescribedMotion, posture: Array) -> Shape:
     """A spline through static shapes: p is prescribed, so p, ṗ and p̈ only have to go with each other exactly."""
-    nodes = shape_nodes(analysis)
+    paths = (target for path in model.scene.trajectory for _, target in path.targets)
+    nodes = _nodes(analysis, [*paths, *model.scene.load_functions])
     near: Array = np.empty((0, len(posture)))
 
     def forces(p: Array, at: Indices) -> Array:
