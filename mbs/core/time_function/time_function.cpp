@@ -11,26 +11,11 @@ namespace ffrobot {
 namespace {
 
 int operand_count(Op op) {
-  switch (op) {
-  case Op::constant:
-  case Op::time:
+  if (op <= Op::time)
     return 0;
-  case Op::negate:
-  case Op::sin:
-  case Op::cos:
-  case Op::tan:
-  case Op::exp:
-  case Op::log:
-  case Op::sqrt:
-  case Op::abs:
-  case Op::tanh:
-  case Op::logical_not:
-    return 1;
-  case Op::select:
+  if (op == Op::select)
     return 3;
-  default:
-    return 2;
-  }
+  return op == Op::logical_not || (op >= Op::negate && op <= Op::tanh) ? 1 : 2;
 }
 
 } // namespace
@@ -38,22 +23,20 @@ int operand_count(Op op) {
 Expression::Expression(std::span<const Op> program, std::span<const double> constants) {
   int depth = 0;
   std::size_t used = 0;
+  const auto require = [](bool is_met) {
+    if (!is_met)
+      throw std::invalid_argument("expression: malformed program");
+  };
   for (const Op op : program) {
-    if (depth < operand_count(op))
-      throw std::invalid_argument("expression: an operator lacks operands");
+    require(depth >= operand_count(op) && (op != Op::constant || used < constants.size()));
     depth += 1 - operand_count(op);
     if (depth > max_depth)
       throw std::invalid_argument("expression: nested deeper than " + std::to_string(max_depth) + " operands");
-    if (op == Op::constant && used == constants.size())
-      throw std::invalid_argument("expression: fewer constants than the program uses");
     program_.push_back({op, op == Op::constant ? constants[used++] : 0.0});
     fold_constants();
     take_constant();
   }
-  if (depth != 1)
-    throw std::invalid_argument("expression: expected one result, found " + std::to_string(depth));
-  if (used != constants.size())
-    throw std::invalid_argument("expression: more constants than the program uses");
+  require(depth == 1 && used == constants.size());
 }
 
 int Expression::Instruction::operands() const { return operand_count(op) - (takes_constant ? 1 : 0); }
@@ -87,9 +70,6 @@ void Expression::take_constant() {
       missing += operand->operands() - 1;
   if (operand->op != Op::constant)
     return;
-  int exponent = 0;
-  if (last.op == Op::divide && std::abs(std::frexp(operand->constant, &exponent)) == 0.5) // as exact, and faster
-    last.op = Op::multiply, operand->constant = 1.0 / operand->constant;
   last.constant = operand->constant, last.takes_constant = true;
   program_.erase(operand);
 }
@@ -118,18 +98,11 @@ Jet Expression::operator()(double t) const {
 PiecewisePolynomial::PiecewisePolynomial(std::vector<double> breaks, std::vector<double> coefficients)
     : breaks_(std::move(breaks)), coefficients_(std::move(coefficients)) {
   const auto finite = [](double x) { return std::isfinite(x); };
-  if (breaks_.size() < 2)
-    throw std::invalid_argument("piecewise polynomial: expected at least 2 breaks, found " +
-                                std::to_string(breaks_.size()));
   const std::size_t intervals = breaks_.size() - 1;
-  if (coefficients_.empty() || coefficients_.size() % intervals != 0)
-    throw std::invalid_argument("piecewise polynomial: expected the same number of coefficients on each of " +
-                                std::to_string(intervals) + " intervals, found " +
-                                std::to_string(coefficients_.size()) + " in all");
-  if (!std::ranges::all_of(breaks_, finite) || !std::ranges::all_of(coefficients_, finite))
-    throw std::invalid_argument("piecewise polynomial: breaks and coefficients must be finite");
-  if (!std::ranges::is_sorted(breaks_, std::ranges::less_equal{}))
-    throw std::invalid_argument("piecewise polynomial: breaks must increase strictly");
+  if (breaks_.size() < 2 || coefficients_.empty() || coefficients_.size() % intervals != 0 ||
+      !std::ranges::all_of(breaks_, finite) || !std::ranges::all_of(coefficients_, finite) ||
+      !std::ranges::is_sorted(breaks_, std::ranges::less_equal{}))
+    throw std::invalid_argument("piecewise polynomial: malformed breaks or coefficients");
   order_ = coefficients_.size() / intervals;
   // An integrator's last stage may land a few roundings beyond the end of the run.
   margin_ = 1e-9 * (breaks_.back() - breaks_.front());
