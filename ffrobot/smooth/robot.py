@@ -131,13 +131,12 @@ class Robot:
         period = 1 / self._lowest(path)
         until = path.end + period
         run = self._solved(path, until + min(LAST * period, LONGEST), period / PER_PERIOD)
-        rest, moments = commanded_rest(run), motor_moments(run)
+        rest, moments = commanded_rest(run, last), motor_moments(run)
         torque = np.array([np.abs(moments[joint]).max() if joint in moments else 0.0 for joint in self.joints])
         postures = run.q[np.searchsorted(run.time, np.linspace(0.0, last, INSTANTS))]
         if rest is None:
             return Ride(None, run.time, np.full(len(run.time), np.nan), postures, torque, np.zeros((2, len(torque))))
         postures[-1] = rest.q
-        rest = rest._replace(since=last)
         whole, soon = (
             settling(one, rest, [self.point], self.tolerance, rest.frequency)[self.point]
             for one in (run, run.at(np.flatnonzero(run.time <= until).tolist()))

@@ -57,8 +57,8 @@ class Rest(NamedTuple):
     frequency: float  # Hz, the lowest of that robot there; NaN where nothing vibrates
 
 
-def commanded_rest(commanding: Run) -> Rest | None:
-    """Return the final posture of a run on paths.
+def commanded_rest(commanding: Run, since: float | None = None) -> Rest | None:
+    """Return the final posture of a run on paths, which are over at time `since`, s, by default as `_end` finds.
 
     None if paths last to its end, the robot can move freely, the run did not complete, or no equilibrium is near its
     last posture.
@@ -67,8 +67,10 @@ def commanded_rest(commanding: Run) -> Rest | None:
     if not isinstance(analysis, TimedAnalysis) or commanding.status != "completed":
         return None
     end = analysis.last_time
-    ends = [_end(target, end, _breaks(path)) for path in model.scene.trajectory for _, target in path.targets]
-    since = max([*ends, *(_end(shape, end, shape.switches()) for _, shape, _ in analysis.prescribed())], default=0.0)
+    if since is None:
+        ends = [_end(target, end, _breaks(path)) for path in model.scene.trajectory for _, target in path.targets]
+        ends += (_end(shape, end, shape.switches()) for _, shape, _ in analysis.prescribed())
+        since = max(ends, default=0.0)
     if not since < commanding.time[-1] or not any(row.is_trajectory for row in model.rows):
         return None
     q = commanding.q[-1]

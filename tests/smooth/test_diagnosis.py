@@ -76,6 +76,13 @@ def test_residual_vibration_of_closed_forms(tmp_path, law, stiffer, expected, ba
     assert "hub causes 100 %" in found.verdict
 
 
+def test_long_records_have_a_place_of_rest(tmp_path):
+    """The motion is over within 2 % of the run."""
+    times = np.linspace(0.0, 150.0, 31)
+    path = table(tmp_path / "path.csv", times, hub=WAY * LAWS["trapezoid"].sample(times * T / 150.0)[:, 0])
+    assert diagnosed(axis(tmp_path), path).verdict.startswith("not vibration of the robot")
+
+
 def test_vibration_by_a_rail_depends_on_the_posture_of_rest(tmp_path):
     """Through the lever m c cos θ of a body behind a gear, which swings by a tenth of its own angle."""
     m, c, ends = 4.0, 0.5, np.array([0.3, 0.8])
