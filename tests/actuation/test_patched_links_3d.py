@@ -159,14 +159,6 @@ def test_shear_around_a_rectangle(ratio):
     assert around == pytest.approx(2 * h * b, rel=1e-4)
 
 
-def test_both_faces_driven_apart_are_the_layout_on_both():
-    """Two layouts on the same stretch of the link, a little longer one below: they share it, and stretch cancels."""
-    body = link(SQUAT, 8)
-    both = tip(body, [layout(face="both")])
-    apart = tip(body, [layout(name="above", face="+y"), layout(name="below", face="-y")])
-    np.testing.assert_allclose(apart[0], both[0], atol=1e-9 * np.abs(both[0]).max())
-
-
 def test_overlap_of_layouts_is_shared():
     """Of patches that overlap in part each stretch has its own section: curvatures add up to the tip."""
     h, b, sides = 0.006, 0.014, {"in-plane": (0.06, 0.14), "out-of-plane": (0.12, 0.2)}

@@ -1,7 +1,5 @@
 """Planar scenes by what they are about, short, and the same scenes in 3D: tables of both."""
 
-from pathlib import Path
-
 import four_bar
 import numpy as np
 import scenes_in_3d
@@ -9,7 +7,6 @@ from beam_links import beam_link, rectangle
 from checkpoints import CASES
 from scenes_in_3d import CRANK, TWO_LINK
 
-from ffrobot.fe_models.link_source import link_keys
 from ffrobot.mbs.fields.spelling import place
 
 SHORT = {"end": 0.05, "output_step": 0.005}
@@ -29,7 +26,6 @@ LOOP = {
 }  # fmt: skip
 TURN_CRANK = {"kind": "joint-pid", "proportional": {"O": 20.0}, "derivative": {"O": 0.5}}
 PCID = {"kind": "pcid"}
-STRESS = {"points": {"top": [0.1, 0.0025, 0.0], "axis": [0.05, 0.0, 0.0], "root": [0.0, -0.002, 0.001]}}
 SAME = ("pzt", "payload", "geometric_stiffening", "analysis", "load")  # spelled the same in both
 
 
@@ -43,25 +39,6 @@ def pair(case, *analyses, start=TWO_LINK, state="undeformed", patches=False, of_
     planar["initial"]["state"] = state
     same = {key: planar[key] for key in SAME if key in planar}
     return planar, scenes_in_3d.in_3d(planar) | {"initial": {"joints": start, "state": state}} | same
-
-
-def stressed(case, *analyses, **keys):
-    """With stresses at points of the links, and all that statics takes."""
-    tables = pair(case, *analyses, **keys)
-    for one in tables:
-        for body in one["body"]:
-            if "link" in body:
-                body["link"] = dict(link_keys(Path(body["link"]))) | {"stress": STRESS}
-    return tables
-
-
-def damped(*analyses, **keys):
-    """With damping of the robot's vibrations in place of that of the links' modes."""
-    tables = pair("two_link", *analyses, **keys)
-    for one in tables:
-        for body in one["body"]:
-            body["link"] = dict(link_keys(Path(body["link"]))) | {"damping": {"ratio": 0.01, "of": "robot"}}
-    return tables
 
 
 def rough_loop():
@@ -114,13 +91,9 @@ def one_link(analysis, of_body=(), stiffened=False, **of_patches):
 FEATURES = {  # what is compared in any case, beside motion and moments; the scene; share of the peaks
     "analyses of two links": ("strain", lambda: pair("two_link", INVERSE, STRAIGHT, STATIC, REST, payload=MASS), 1e-8),
     "a loop": ("deflection", lambda: pair("slider_crank", INVERSE, start=CRANK), 1e-8),
-    "stiffening in a loop": (
-        "deflection", lambda: pair("slider_crank", INVERSE, start=CRANK, geometric_stiffening=True), 1e-7
-    ),
     "gears that give between frames": (
         "frequency", lambda: pair("two_link", LINEAR, of_joints=GEARS[::-1], motors="frame"), 1e-6
     ),  # of responses at 0.2 rad/s, where round-off counts (38 000 / 0.2)² times
-    "damping of the robot": ("frequency", lambda: damped(LINEAR, of_joints=GEARS), 1e-6),
     "a controller of a loop of bodies": (
         "commands",
         lambda: pair(
@@ -128,22 +101,10 @@ FEATURES = {  # what is compared in any case, beside motion and moments; the sce
             of_joints=[{"motor": True, "gear_ratio": 20.0, "rotor_inertia": 1e-5}],
         ), 1e-6,
     ),
-    "stresses in a loop": ("von_mises", lambda: stressed("slider_crank", INVERSE, start=CRANK), 1e-7),
     "friction in a loop": ("dissipated_power", rough_loop, 1e-8),
     "patches that stiffen": (
         "stiffness_ratio",
         lambda: one_link(PCID, structural=True, density=7800.0, face="both", limit=20.0), 1e-7,
-    ),
-    "patches that turn sections": ("voltage", lambda: one_link(PCID, coupling="rotation"), 1e-7),
-    "weights of patches": (
-        "voltage",
-        lambda: one_link(
-            PCID, allocation="least-squares", point_weights={"tip": 1.0}, structural=["stiffness"], limit=30.0
-        ), 1e-7,
-    ),
-    "finer check": ("deflection", lambda: one_link({"kind": "pcid", "check": "finer"}), 1e-6),
-    "an implicit integrator": (
-        "deflection", lambda: pair("two_link", INVERSE | {"integrator": "radau", "tolerance": 1e-6, "end": 0.01}), 1e-7,
     ),
     "motors alone": ("moment", lambda: one_link({"kind": "motors-only"}, count=0), 1e-5),
     "few modes": ("required_voltage", few_modes, 1e-7),
@@ -152,7 +113,7 @@ FEATURES = {  # what is compared in any case, beside motion and moments; the sce
 COMPARED = (
     "coordinate", "rate", "moment", "reaction", "force", "modal", "modal_force", "position",
     "deflection", "target", "kinetic", "strain", "dissipated_power", "frequency", "motor_angle", "gear_moment",
-    "required_voltage", "voltage", "von_mises", "stress", "commands", "wanted", "tip_error", "residual", "edges",
+    "required_voltage", "voltage", "commands", "wanted", "tip_error", "residual", "edges",
     "moment_per_volt", "stiffness_ratio", "authority",
 )  # fmt: skip
 

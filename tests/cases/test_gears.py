@@ -157,36 +157,6 @@ def test_inverse_analyses_account_for_what_gears_store_and_lose(kind, followed, 
         assert np.ptp(energy) > 1.0
 
 
-@pytest.mark.parametrize("turned", [False, True])
-@pytest.mark.parametrize("space", ["planar", "spatial"])
-def test_a_body_starts_twisted_or_turning_behind_a_motor_on_a_path(turned, space):
-    """J γ̈ + c γ̇ + k γ = 0 from [initial]: e^{−dt} (γ₀ cos wt + (γ̇₀ + d γ₀)/w sin wt); the motor stands at 0.
-
-    A rotor on the body itself turns with it.
-    """
-    inertia, k, c, start, rate = 0.05, 200.0, 0.4, 0.1, 1.0
-    gear = {"gear_ratio": 50.0, "rotor_inertia": 1e-4, "stiffness": k, "damping": c}
-    sides = ("a.root", "ground") if turned else ("ground", "a.root")
-    axis = {} if space == "planar" else {"axis": [0.0, 0.0, 1.0]}
-    plane = {"mass": 1.0, "inertia": inertia, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0]}}
-    tables = scene(
-        [{"name": "a", "rigid": plane}] if space == "planar" else [tables_3d.rigid("a", 1.0, [inertia] * 3)],
-        [{"name": "O", "type": "revolute", "between": list(sides), **gear} | axis],
-        {"name": "run", "kind": "pcid", "end": 0.5, "output_step": 0.01, "tolerance": 1e-9},
-        space=space, gravity=[0.0, 0.0] if space == "planar" else ORIGIN,
-        trajectory=[{"name": "t", "motor": "O", "value": "0"}],
-        initial={"joints": {"O": start}, "joint_rates": {"O": rate}},
-    )  # fmt: skip
-    with solved(tables) as found:
-        t, gamma, motor = (found[f"run/{key}"] for key in ("time", "joints/O/coordinate", "joints/O/motor_coordinate"))
-    J = inertia + turned * gear["rotor_inertia"]
-    d = c / (2 * J)
-    w = np.sqrt(k / J - d**2)
-    expected = np.exp(-d * t) * (start * np.cos(w * t) + (rate + d * start) / w * np.sin(w * t))
-    np.testing.assert_allclose(gamma, expected, atol=1e-8)
-    np.testing.assert_allclose(motor, 0.0, atol=1e-12)
-
-
 def test_motors_behind_gears_are_judged_between_outputs():
     """γ = A sin ωt against inertia I: k δ = I γ̈ and τ = (I + J N²) γ̈ + J N² δ̈, θ̇_m = γ̇ + δ̇; peaks at no output."""
     A, w, I = 0.3, 7.4, 0.4  # noqa: E741

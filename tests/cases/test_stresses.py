@@ -10,7 +10,7 @@ import ffrobot
 LENGTH, R_OUTER, R_INNER = 0.8, 0.02, 0.016
 AREA, INERTIA = np.pi * (R_OUTER**2 - R_INNER**2), np.pi / 4 * (R_OUTER**4 - R_INNER**4)
 RHO, STATION, AT = 2700.0, 0.3, 0.02
-FORCE, MOMENT = np.array([300.0, 20.0, -30.0]), np.array([8.0, -3.0, 5.0])
+FORCE, MOMENT, CARRIED = np.array([300.0, 20.0, -30.0]), np.array([8.0, -3.0, 5.0]), 1.5  # N, N·m, kg
 
 
 HOLD = {"name": "hold", "joint": "roll", "value": "0"}
@@ -31,22 +31,23 @@ def cantilever(family, analysis, path=HOLD, damping=0.01, **more):
 
 @pytest.mark.parametrize("family", ["all", "in-plane-bending"])
 def test_a_cantilever_under_force_and_moment_at_its_tip(family):
-    """Two bendings, tension and torsion at once: σ = N/A + M_y z/I − M_z y/I, τ = M_x r/I_p + V Q/(I b)."""
+    """Under weight, too, two bendings, tension, torsion: σ = N/A + M_y z/I − M_z y/I, τ = M_x r/I_p + V Q/(I b)."""
     components = dict(
         zip(("x", "y", "z", "mx", "my", "mz"), map(repr, [*FORCE.tolist(), *MOMENT.tolist()]), strict=True)
     )
-    arm, weight = LENGTH - STATION, RHO * AREA * 9.81
-    M_y = MOMENT[1] - arm * FORCE[2] + weight * arm**2 / 2
+    arm, weight, payload = LENGTH - STATION, RHO * AREA * 9.81, CARRIED * 9.81
+    M_y = MOMENT[1] - arm * (FORCE[2] - payload) + weight * arm**2 / 2
     M_z = MOMENT[2] + arm * FORCE[1]
     torsion = MOMENT[0] * AT / (2 * INERTIA)
     shear = 2 / 3 * (R_OUTER**3 - R_INNER**3) / (INERTIA * 2 * (R_OUTER - R_INNER))  # Q/(I b), for 1 N
     expected = {  # σ_xx, τ_xz, τ_xy
         "up": (FORCE[0] / AREA + M_y * AT / INERTIA, 0.0, shear * FORCE[1] - torsion),
-        "side": (FORCE[0] / AREA - M_z * AT / INERTIA, shear * (FORCE[2] - weight * arm) + torsion, 0.0),
+        "side": (FORCE[0] / AREA - M_z * AT / INERTIA, shear * (FORCE[2] - payload - weight * arm) + torsion, 0.0),
     }
     peak = expected["up"][0]
     share = 2e-3 if family == "all" else 1e-9  # with modes the tip moves, by 1e-3 of the length: other arms
-    with ffrobot.solve(cantilever(family, REST, load=[{"point": "tube.tip", **components}])) as results:
+    keys = {"load": [{"point": "tube.tip", **components}], "payload": [{"point": "tube.tip", "mass": CARRIED}]}
+    with ffrobot.solve(cantilever(family, REST, **keys)) as results:
         for point, stress in expected.items():
             found = results[f"rest/stress/tube/points/{point}/stress"][0]
             np.testing.assert_allclose(found, [stress[0], 0, 0, 0, *stress[1:]], rtol=0, atol=share * peak)

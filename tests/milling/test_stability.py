@@ -133,13 +133,6 @@ def test_lobes_of_the_published_case_are_those_of_collocation(cutter, speed):
     )
 
 
-def test_collocation_of_the_published_case_has_converged():
-    at = FEED, TENTH, 2e-3, revolutions(5000.0)
-    assert collocated(*at, 40) == pytest.approx(collocated(*at, 60), rel=1e-7)
-    whole = FEED, milling(0.0), 1e-3, revolutions(5000.0)
-    assert growth(*whole) == pytest.approx(collocated(*whole, 60), rel=2e-3)
-
-
 def test_semi_discretization_says_where_a_tooth_period_has_too_many_waves():
     with pytest.raises(InputError, match=r"modes within 200 rad of a tooth period, found 347.6 rad at 500"):
         growth(FEED, TENTH, 1e-3, revolutions(500.0))
