@@ -17,6 +17,7 @@ from ..mbs.model.known_motion import mass_matrices
 from ..mbs.model.system import MultibodySystem, split_forces
 from ..mbs.quantities.motion import modal_coordinates, node_of, point_names
 from ..mbs.quantities.supply import actuator_forces, motors_fit
+from ..mbs.run.context import amplifiers_on
 from ..mbs.run.record import Run
 from .motors import MotorFeasibility, first_time, judge_motors
 
@@ -224,6 +225,7 @@ class Feasibility:
 def judge_patches(
     patches: PatchArray,
     voltages: Voltages,
+    charge: Array,
     time: Array,
     p: Array,
     F_p: Array,
@@ -231,19 +233,18 @@ def judge_patches(
 ) -> PatchFeasibility:
     """Return the requirements on the patches of one layout.
 
-    Modal coordinates p (T, n), m·√kg, and required forces F_p (T, n), N/√kg, are on the modes of the layout at `time`
-    (T,), s. `with_count(k)`, if any, is the largest voltage (V) of k such patches, None where they have no room.
+    At `time` (T,), s: `charge` (T, k), C, modal coordinates p (T, n), m·√kg, of the link, required forces F_p (T, m),
+    N/√kg, on modes of the layout. `with_count(k)`, if any: largest voltage (V) of k such patches; None without room.
     """
     amplifiers, layout, pace = patches.amplifiers, patches.layout, 1.0 / np.diff(time)[:, None]
     required, limit = worst(voltages.required, amplifiers.range)
-    charge = voltages.required * amplifiers.capacitance + p @ patches.Phi_V
     slew, current = (np.abs(np.diff(of, axis=0) * pace) for of in (voltages.required, charge))
     beyond = np.any([voltages.required < amplifiers.range[0], voltages.required > amplifiers.range[1]], axis=0)
     beyond[1:] |= (slew > amplifiers.slew * KEPT) | (current > amplifiers.current * KEPT)
     toward = [np.where(sign * patches.Phi_V > 0.0, *amplifiers.range[::-1]) for sign in (-1.0, 1.0)]
     of_modes = np.array([(patches.Phi_V * V).sum(axis=1) for V in toward])
     mode_required, mode_available = worst(F_p[:, : patches.served], of_modes[:, : patches.served])
-    curvature = np.abs(p @ patches.turn).max(axis=0) / layout.length
+    curvature = np.abs(p @ patches.effects.turn.T).max(axis=0) / layout.length
     return PatchFeasibility(
         required_moment=np.abs(patches.moment_per_volt) * required,
         available_moment=np.abs(patches.moment_per_volt) * limit,
@@ -330,13 +331,14 @@ def judge_actuators(
     """
     judged: dict[str, PatchFeasibility] = {}
     for body, of_link in patches.items():
-        link = links[body]
+        link, required = links[body], np.hstack([voltages[name].required for name in of_link.arrays])
+        charge = required @ amplifiers_on(run.model, {body: of_link}).capacitance + link.p @ of_link.Phi_V
         for name, array in of_link.arrays.items():
             if not array.layout.is_driven:
                 continue
             trial = None if run.analysis.is_repeated else partial(_largest_voltage, run, link, array.layout)
-            p, F_p = array.modes.coordinates(link.p), array.modes.forces(link.F_p)
-            judged[name] = judge_patches(array, voltages[name], run.time, p, F_p, trial)
+            own, F_p = charge[:, of_link.columns(name)], array.modes.forces(link.F_p)
+            judged[name] = judge_patches(array, voltages[name], own, run.time, link.p, F_p, trial)
     return Feasibility(judge_motors(run), judged, find_unsupplied(run, links, patches, voltages, others))
 
 

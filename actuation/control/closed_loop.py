@@ -13,7 +13,7 @@ from ...common.arrays import Array
 from ...common.errors import InputError, SolveError
 from ...common.libraries import scipy
 from ...mbs._core import TimeFunction
-from ...mbs.analysis.forward import actuator_commands, command_ranges, largest_moments, strain_directions
+from ...mbs.analysis.forward import actuator_commands, command_ranges, largest_moments
 from ...mbs.linear.linearisation import LinearEquations
 from ...mbs.linear.statics import initial_state
 from ...mbs.model.amplifiers import joined
@@ -23,7 +23,7 @@ from ...mbs.model.known_motion import State
 from ...mbs.model.model import Model
 from ...mbs.posture.start import undeformed_posture
 from ...mbs.quantities.settling import commanded_rest
-from ...mbs.run.context import place_of
+from ...mbs.run.context import amplifiers_on, place_of, strain_directions
 from ...mbs.run.drive import Control, drive_robot
 from ...mbs.run.gears import with_motor_coordinates
 from ...mbs.run.record import Run
@@ -63,7 +63,8 @@ class LoopTask:
             tip = analysis.tip or default_tip(robot.model)
             estimated = merged(signals(estimated_sensors(robot, analysis.controller, tip)), ())
         self.sensing, self.ideal = Sensing(plant, read), Sensing(plant, estimated)  # ideal: what an observer estimates
-        self.amplifiers, self.ranges = joined(context.patches.values()), command_ranges(context.model, context.patches)
+        self.amplifiers = amplifiers_on(plant, context.patches)
+        self.ranges = command_ranges(context.model, context.patches)
         if analysis.unlimited:
             self.amplifiers, self.ranges = self.amplifiers.unlimited(), np.inf * np.sign(self.ranges)
 
@@ -126,9 +127,9 @@ def _setup(task: LoopTask, outputs: Array) -> tuple[Setup, Array]:
     if not moved.gears:  # gears that give are known at outputs
         source = _resolved(source)
         moved = with_motor_coordinates(source, task.plant)
-    reference, wanted = (
-        between(samples, source.time, of.read(moved.q, moved.v, moved.a)) for of in (task.sensing, task.ideal)
-    )
+    V = _feed_forward(task, source.time - task.analysis.delay - T / 2, whole=True)[:, len(task.robot.motors) :]
+    states = moved.q, moved.v, moved.a, V
+    reference, wanted = (between(samples, source.time, of.read(*states)) for of in (task.sensing, task.ideal))
     filtered = Filter(task.sensing.signals, T)
     reference[:] = [filtered(y) for y in reference]
     setup = Setup(
@@ -161,16 +162,17 @@ def _control(
 
     def at_sample(k: int, t: float, state: Array) -> Array:
         q, v, a = (part[None] for part in (state[:n_q], state[n_q:rates], state[rates:]))
+        V = held(np.array([t]), after=-instant)[:, len(loop.first) - len(task.amplifiers.slew) :]
         if states is not None:
-            states.append(state.copy())
-        return loop(k, t, task.sensing.read(q, v, a)[0])
+            states.append(np.append(state, V))
+        return loop(k, t, task.sensing.read(q, v, a, V)[0])
 
     T, controller = task.analysis.sample_time, at_sample
     arriving: Loop | AmplifiedLoop = loop
     if task.amplifiers.acts:
         directions = strain_directions(plant, patches)
         arriving = controller = AmplifiedLoop(
-            loop, at_sample, samples, T, amplifiers=task.amplifiers, directions=directions, n_q=n_q
+            loop, at_sample, samples, T, amplifiers=task.amplifiers, directions=directions
         )
         samples = arriving.times
     instant = INSTANT * T
@@ -188,9 +190,9 @@ def _control(
 
 
 def _true_values(task: LoopTask, states: Sequence[Array]) -> dict[str, Array]:
-    """What an observer estimates, in the `states` of the plant, by name."""
+    """What an observer estimates, in the `states` of the plant with its voltages, by name."""
     n_q, n_v = task.plant.tree.n_q, task.plant.tree.n_v
-    values = task.ideal.read(*np.split(np.array(states), [n_q, n_q + n_v], axis=1))
+    values = task.ideal.read(*np.split(np.array(states), [n_q, n_q + n_v, n_q + 2 * n_v], axis=1))
     return dict(zip([signal.name for signal in task.ideal.signals], values.T, strict=True))
 
 
@@ -247,7 +249,7 @@ def loops_about(
         return law if law is None or observed is None else observed.schedule.at(t).closed(law)
 
     found = [(model, at(model.time, min(int(np.searchsorted(setup.times, model.time)), latest))) for model in models]
-    of, motors = joined(setup.robot.of_links.values()), np.zeros((2, len(setup.robot.motors)))
+    of, motors = joined(of.amplifiers for of in setup.robot.of_links.values()), np.zeros((2, len(setup.robot.motors)))
     late = np.hstack([motors, np.stack([of.lag, of.delay])])
     known = [(model, replace(feedback, late=late)) for model, feedback in found if feedback is not None]
     if len(known) < len(found) or not known:

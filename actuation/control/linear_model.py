@@ -107,7 +107,7 @@ class SampledController(StateSpace):
 class LinearModel(StateSpace):
     """Linear model about a configuration or one instant of a motion: states x = (δs, δṡ), f coordinates s.
 
-    D of accelerations alone is not 0.
+    D of accelerations, patches and strains alone is not 0.
 
     Attributes:
         state_names: "joint/NAME", "modal/BODY/k", … and their rates, "rate of joint/NAME", …
@@ -165,22 +165,27 @@ class LinearModel(StateSpace):
 
 
 def state_space(
-    mechanism: LinearMechanism, readings: Mapping[str, tuple[Array, Array, Array]] = MappingProxyType({})
+    mechanism: LinearMechanism, readings: Mapping[str, Sequence[Any]] = MappingProxyType({})
 ) -> LinearModel:
     """Return the state space of a linear mechanism with sensors.
 
-    `readings` are derivatives (f,) of outputs by coordinates s, ṡ and s̈, in SI units, by name of the output.
+    `readings` are derivatives of outputs by s, ṡ, s̈ (f,) and voltages of patches (k,), SI units, by name of the output.
     """
     f, inputs = len(mechanism.M), mechanism.inputs
     modal = {name: row for name, row in zip(mechanism.names, np.eye(f), strict=True) if name.startswith("modal/")}
     none = np.zeros(f)
-    outputs = {name: (row, none, none) for name, row in (*mechanism.outputs.items(), *modal.items())} | dict(readings)
+    own = {name: (row, none, none, 0.0) for name, row in (*mechanism.outputs.items(), *modal.items())}
+    outputs: dict[str, Sequence[Any]] = {**own, **readings}
     columns = np.column_stack([mechanism.K, mechanism.D, *inputs.values()])
     solved = np.linalg.solve(mechanism.M, columns)
     A = np.block([[np.zeros((f, f)), np.eye(f)], [-solved[:, : 2 * f]]])
     B = np.vstack([np.zeros((f, len(inputs))), solved[:, 2 * f :]])
-    by_s, by_rate, by_acceleration = np.reshape(list(outputs.values()), (len(outputs), 3, f)).swapaxes(0, 1)
+    of_s = np.reshape([of[:3] for of in outputs.values()], (len(outputs), 3, f))
+    by_s, by_rate, by_acceleration = of_s.swapaxes(0, 1)
     C, D = np.hstack([by_s, by_rate]) + by_acceleration @ A[f:], by_acceleration @ B[f:]
+    volts = [k for k, name in enumerate(inputs) if name.startswith("pzt/")]
+    for row, of in zip(D, outputs.values(), strict=True):
+        row[volts] += of[3]
     names = (*mechanism.names, *(f"rate of {name}" for name in mechanism.names))
     return LinearModel(
         A=A,

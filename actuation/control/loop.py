@@ -84,7 +84,7 @@ class Loop:
 class AmplifiedLoop:
     """Sampled loop with amplifiers, called at every step: motor commands, and mean voltages behind the amplifiers.
 
-    `directions` (k, n_v) times v: current, A, by the strain of each of k patches; states are `n_q` coordinates, v, a.
+    `directions` (k, n_v) times v: current, A, by the strain of each of k patches; states end with v and a.
     """
 
     def __init__(
@@ -96,7 +96,6 @@ class AmplifiedLoop:
         *,
         amplifiers: Amplifiers,
         directions: Array,
-        n_q: int,
     ) -> None:
         # steps of a sample: two in the shortest time constant, four where rates or currents have limits, at most 20,
         # as few as divide delays
@@ -105,7 +104,7 @@ class AmplifiedLoop:
         late = np.outer(parts, amplifiers.delay / T)
         self._parts = int(parts[np.abs(late - np.rint(late)).max(axis=1).round(1).argmin()])
         self._loop, self._at_sample, self._samples, self._amplifiers = loop, at_sample, samples, amplifiers
-        self._directions, self._n_q, self._h = directions, n_q, T / self._parts
+        self._directions, self._h = directions, T / self._parts
         self.times: Array = (samples[:, None] + self._h * np.arange(self._parts)).ravel()
         self.first, self.taken = loop.first, 0
         self.commands = np.zeros((len(self.times), len(self.first)))
@@ -122,7 +121,7 @@ class AmplifiedLoop:
         last = loop.commands[loop.taken - 1]
         wanted = np.array([self._wanted(t, motors + j, d) for j, d in enumerate(self._amplifiers.delay)])
         wanted = self._compensated.at(wanted)
-        v, a = np.split(state[self._n_q :], 2)
+        v, a = np.split(state[-2 * self._directions.shape[1] :], 2)
         strain = self._directions @ (v + self._h / 2 * a)  # half way
         self._now, mean = self._amplifiers.advance(self._h, self._now, (wanted, wanted), strain)
         command: Array = np.concatenate([last[:motors], self._played.at(mean, self._now)])
@@ -210,8 +209,8 @@ def held_commands(times: Array, samples: Array, delay: float, loop: Loop | Ampli
     A command of `samples` (K,), s, acts `delay` (s) later.
     """
     taken = slice(loop.taken)
-    which = np.searchsorted(samples[taken] + delay, times + after, side="right")
-    return np.vstack([loop.first, loop.commands[taken]])[which]
+    which = np.searchsorted(samples[taken], times + (after - delay), side="right")
+    return np.where(which[:, None] > 0, loop.commands[which - 1], loop.first)
 
 
 def times_of_run(outputs: Array, place_at: Callable[[Array], Array], lowest: float) -> tuple[Array, list[int]]:

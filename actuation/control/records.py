@@ -36,7 +36,7 @@ class Sensor(Referring):
     """A sensor of a joint coordinate, of a point, of the strain at a point, or of patch voltages.
 
     Accelerations are in global axes; "accelerometer" is r̈ − g and "gyro" the angular velocity, in the axes of the
-    section. Patches read the charge Φ_Vᵀ p over `capacitance`; none with a `shunt`.
+    section. Patches read the charge of strain over `capacitance`; none with a `shunt`.
 
     A reading is filtered by `high_pass`, known `delay` later, gets `bias` and Gaussian noise, is cut at ±`range`,
     rounded to `resolution`, and kept for `sample_time`.

@@ -29,7 +29,7 @@ from ..patches.patches import voltage_gain
 from .linear import with_voltages
 from .linear_model import numbers
 from .records import Controller, JointPid, Lqr, ModalVelocity, PythonController, Sensor
-from .signals import check_joint, volts_on_file
+from .signals import check_joint
 
 
 def rigid_freedom(model: Model) -> int:
@@ -181,14 +181,13 @@ class ControlledRobot:
         """Patches by link, with the modes that its layouts reach together."""
         signals = {}
         for name, of_link in self.of_links.items():
-            reached, arrays = of_link.reach.modes, of_link.arrays
-            volts = [volts_on_file(of_link, layout)[name] for layout in arrays]
+            reached, arrays, own = of_link.reach.modes, of_link.arrays, of_link.bodies[name]
             to_file = self.model.tree.nodes[self.model.tree.index[name]].body.modal_transform
             signals[name] = PatchSignals(
                 inputs=tuple(f"pzt/{layout}/{k}" for layout, of in arrays.items() for k in range(1, len(of.edges) + 1)),
                 omega=np.sqrt(reached.stiffness[: reached.served]),
                 gain=voltage_gain(of_link.reach),
-                volts=reached.forces(np.vstack(volts)),
+                volts=reached.forces(np.linalg.solve(own.capacitance, own.charge.T)),
                 own=reached.coordinates(to_file.T).T,
             )
         return signals

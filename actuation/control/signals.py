@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import field
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 
@@ -15,10 +15,9 @@ from ...mbs.model.known_motion import KnownStates, motion_forces
 from ...mbs.model.model import Model
 from ...mbs.model.nodes import Section
 from ...mbs.model.system import MultibodySystem
-from ...mbs.run.context import WholeLinks, place_of
+from ...mbs.run.context import WholeLinks, place_of, strain_directions
 from ...mbs.scene.space import SPACES
 from ..context import ActuatedContext
-from ..patches.link_patches import LinkPatches, OnBody
 from .records import Measure, Sensor
 
 ORDERS = {measure: order for order, measure in enumerate(get_args(Measure))}
@@ -29,6 +28,7 @@ STEP = 2.0**-13  # of differences of readings of points, in rad, m, √kg·m and
 class Signal:
     """One reading, SI: coordinate `axis` (0, 1, 2) of a `point`, or `along` (n_v,) times joint and modal coordinates.
 
+    `by_volts` (k,) times voltages of all patches is added, by strains that modes lack.
     `name`: "joint/NAME", "motor/NAME", "point/BODY.POINT/x" or y or z, "strain/BODY.POINT", "pzt/LAYOUT/k",
     "modal/BODY/k" (k from 1), followed by "/rate", … where that is measured.
     """
@@ -36,6 +36,7 @@ class Signal:
     name: str
     sensor: Sensor
     along: Array = field(default_factory=lambda: np.zeros(0))
+    by_volts: Array | float = 0.0
     point: str = ""
     axis: int = 0
 
@@ -52,6 +53,7 @@ class Sensing:
         tree = model.tree
         self._tree, self.signals = tree, read
         self._linear = np.array([k for k, signal in enumerate(read) if not signal.point], dtype=int)
+        self._by_volts = [k for k, signal in enumerate(read) if np.any(signal.by_volts)]
         self._order = np.array([read[k].order for k in self._linear], dtype=int)
         self._along = np.reshape([read[k].along for k in self._linear], (len(self._linear), tree.n_v))
         # (n_v,) index in q of the coordinate of each rate; for orientations another one, which nothing reads
@@ -71,11 +73,14 @@ class Sensing:
         drives = Drives(at_points=tuple(PointDrive(point, {}) for point in sections))
         self._system = MultibodySystem(model, drives) if accelerated else None
 
-    def read(self, q: Array, v: Array, a: Array) -> Array:
-        """Return readings (T, signals), SI units, in states q (T, n_q), v and a (T, n_v)."""
+    def read(self, q: Array, v: Array, a: Array, V: Array | None = None) -> Array:
+        """Return readings (T, signals), SI units, in states q (T, n_q), v and a (T, n_v), under voltages V (T, k)."""
         found = np.zeros((len(q), len(self.signals)))
         values = q[:, self._where] @ self._along.T, v @ self._along.T
         found[:, self._linear] = np.where(self._order == ORDERS["value"], *values)
+        if V is not None:
+            for k in self._by_volts:
+                found[:, k] += V @ self.signals[k].by_volts
         if not self._points:
             return found
         places, forces = self._tree.places(q, v), None
@@ -113,12 +118,10 @@ class Sensing:
         return by_s, by_rate, by_acceleration
 
 
-def readings_at(
-    model: Model, mechanism: LinearMechanism, read: Sequence[Signal]
-) -> dict[str, tuple[Array, Array, Array]]:
-    """Return derivatives (f,), SI, of each reading by s, ṡ and s̈ of a linear mechanism of `model`, by name."""
-    rows = zip(*Sensing(model, read).rows(mechanism), strict=True)
-    return dict(zip([signal.name for signal in read], rows, strict=True))
+def readings_at(model: Model, mechanism: LinearMechanism, read: Sequence[Signal]) -> dict[str, Sequence[Any]]:
+    """Return derivatives of each reading by s, ṡ, s̈ (f,) of a linear mechanism of `model`, and by voltages, by name."""
+    rows = zip(read, *Sensing(model, read).rows(mechanism), strict=True)
+    return {signal.name: (*slopes, signal.by_volts) for signal, *slopes in rows}
 
 
 def make_signals(
@@ -133,6 +136,7 @@ def make_signals(
 
 def _of_sensor(model: Model, context: ActuatedContext, sensor: Sensor, whole: WholeLinks | None) -> Iterator[Signal]:
     ending = "" if sensor.measure == "value" else f"/{sensor.measure}"
+    volts, links = strain_directions(model, context.patches), context.patches.values()
     if sensor.joint is not None:
         check_joint(model, sensor.joint)
         sign = model.tree.nodes[model.tree.carried[sensor.joint]].sign
@@ -146,10 +150,15 @@ def _of_sensor(model: Model, context: ActuatedContext, sensor: Sensor, whole: Wh
         for axis in space.rotations if sensor.measure == "gyro" else space.translations:
             yield Signal(f"point/{sensor.point}/{'xyz'[axis]}{ending}", sensor, point=place, axis=axis)
     elif sensor.pzt is not None:
-        body = next(body for body, of_link in context.patches.items() if sensor.pzt in of_link.arrays)
-        volts = volts_on_file(context.patches[body], sensor.pzt, sensor.capacitance)
-        for k, along in enumerate(model.modal_directions({name: of.T for name, of in volts.items()}), 1):
-            yield Signal(f"pzt/{sensor.pzt}/{k}", sensor, along=along)
+        of_link = next(of for of in links if sensor.pzt in of.arrays)
+        C = np.sum([of.capacitance for name, of in of_link.bodies.items() if name in model.tree.index], axis=0)
+        C = C if sensor.capacitance is None else sensor.capacitance * np.eye(len(C))
+        by_charge = np.linalg.inv(C)[of_link.columns(sensor.pzt)]
+        along = by_charge @ model.modal_directions({name: of.charge for name, of in of_link.bodies.items()})
+        by_volts = -model.compliance(along, volts)
+        by_volts[:, [of is of_link for of in links for _ in of.edges]] += by_charge @ of_link.static
+        for k, pair in enumerate(zip(along, by_volts, strict=True), 1):
+            yield Signal(f"pzt/{sensor.pzt}/{k}", sensor, *pair)
     elif sensor.modal is not None:
         for k, along in enumerate(_modal_coordinates(model, sensor.modal, whole), 1):
             yield Signal(f"modal/{sensor.modal}/{k}{ending}", sensor, along=along)
@@ -159,10 +168,14 @@ def _of_sensor(model: Model, context: ActuatedContext, sensor: Sensor, whole: Wh
         wanted = f'a point of [stress] in the link file of "{link}" ({quoted(points)})'
         check_known(place, points, f"sensor: strain: expected {wanted}")
         coordinates = _modal_coordinates(model, link, whole)
-        tree = (model if whole is None else whole.model).tree
-        on_file = tree.nodes[tree.index[link]].body.modal_transform
-        along = points[place].strain[0] @ on_file @ coordinates
-        yield Signal(f"strain/{sensor.strain}", sensor, along=along)
+        tree, at, of = (model if whole is None else whole.model).tree, points[place], context.patches.get(link)
+        body = tree.nodes[tree.index[link]].body
+        row = at.strain[0] @ body.modal_transform
+        is_beside = of is not None and bool((np.prod(of.edges - at.position[0], axis=1) > 0.0).all())
+        if is_beside:  # modes bend here, too, where patches do
+            row = np.linalg.solve(context.links[link].stiffness, at.strain[0]) @ body.on_file.T * body.stiffness
+        along = row @ coordinates
+        yield Signal(f"strain/{sensor.strain}", sensor, along, -is_beside * model.compliance(along[None], volts)[0])
 
 
 def filters(read: Sequence[Signal], T: float) -> tuple[Array, Array, Array, Array]:
@@ -226,25 +239,6 @@ def _modal_coordinates(model: Model, link: str, whole: WholeLinks | None) -> Arr
     found = np.zeros((len(rows), model.tree.n_v))
     found[:, columns] = rows
     return found
-
-
-def volts_on_file(of_link: LinkPatches, layout: str, capacitance: float | None = None) -> dict[str, Array]:
-    """Return readings (k, n), V/(m·√kg), of the k patches of a layout per unit of n modes of the file, by body.
-
-    A patch reads its charge over its `capacitance`, F. By reciprocity the charge of a deflection is the modal force of
-    a voltage, Φ_Vᵀ p (Lee and Moon, J. Appl. Mech. 57, 1990). A patch that also drives the link is read through a
-    bridge, which leaves this voltage (Dosch, Inman and Garcia, J. Intell. Mater. Syst. Struct. 3, 1992). With open
-    electrodes patches bend the link back, by strains that modes lack.
-    """
-    columns, bodies = of_link.columns(layout), of_link.bodies
-    pieces = [name for name in bodies if name != of_link.body]
-
-    def volts(of: OnBody, parts: Iterable[str]) -> Array:
-        if capacitance is not None:
-            return of.charge[:, columns].T / capacitance
-        return np.linalg.solve(np.sum([bodies[part].capacitance for part in parts], axis=0), of.charge.T)[columns]
-
-    return {name: volts(of, pieces if name in pieces else [name]) for name, of in bodies.items()}
 
 
 def check_joint(model: Model, joint: str) -> None:

@@ -49,7 +49,6 @@ from .sections import (
     own_row,
     potentials,
     side,
-    straight_loads,
 )
 
 SLIVER = 1e-6  # of a patch: what a station cuts off less of stays whole
@@ -70,18 +69,6 @@ class GaussPoint(NamedTuple):
     x: float
     weight: float
     station: int
-
-
-def composite(placed: Sequence[PlacedLayout], body: ModalBody) -> tuple[Array, Array, Array]:
-    """Return the mutual effects of the k patches of all layouts and their link, over n modes of the modal body.
-
-    These are the stiffness (n, n), rad²/s², that patches add; modal forces per volt (k, n), N/(√kg·V), by which the
-    layers' stiffness reduces those on a straight link; and what strains that modes lack add to capacitances (k, k),
-    F: 0 where rigidities are not known.
-    """
-    layers = layers_on_link(placed, body)
-    stiffness, per_volt = layers.B.T @ layers.by_modes, layers.by_volts.T @ layers.B
-    return 0.5 * (stiffness + stiffness.T), layers.straight.T @ layers.B - per_volt, layers.yielding
 
 
 def section_loads(placed: PlacedLayout, body: ModalBody, p: Array, voltages: Array) -> SectionLoads:
@@ -131,16 +118,19 @@ def layers_on_link(placed: Sequence[PlacedLayout], body: ModalBody) -> LayersOnL
     B = strains[:, felt].reshape(-1, body.mode_count)
     patches = sum(len(edges) for _, edges in placed)
     C, f = np.zeros((len(B), len(B))), np.zeros((len(B), patches))
-    straight, exact = np.zeros_like(f), np.zeros(len(B))
+    straight, exact, known = np.zeros_like(f), np.zeros(len(B)), dict[tuple[int, int], tuple[Array, Array, Array]]()
     for i, at in enumerate(points):
         block = slice(len(felt) * i, len(felt) * (i + 1))
         exact[block] = 1.0 / (at.weight * sections.rigidity[at.station, felt])
         for layout, patch in covering[at.interval]:
-            of_strain, of_volt = felt_loads(layout, sections, at.station)
-            C[block, block] += at.weight * of_strain[np.ix_(felt, felt)]
-            f[block, patch] = at.weight * of_volt[felt]
-            straight[block, patch] = at.weight * straight_loads(layout, *place_of(layout, sections, at.station))[felt]
-    R = _residual(exact, B @ np.linalg.solve(body.stiffness, B.T))
+            key = id(layout), int(sections.alike[at.station])
+            if key not in known:
+                known[key] = felt_loads(layout, sections, at.station)
+            of_strain, of_volt, on_straight = known[key]
+            C[block, block] += at.weight * of_strain[np.ix_(felt, felt)] * layout.adds_stiffness
+            f[block, patch] = at.weight * (of_volt if layout.adds_stiffness else on_straight)[felt]
+            straight[block, patch] = at.weight * on_straight[felt]
+    R = _residual(exact, np.linalg.solve(np.linalg.cholesky(body.stiffness), B.T).T)
     held = np.linalg.solve(np.eye(len(B)) + C @ R, np.concatenate([C @ B, f], axis=1))
     by_volts = held[:, B.shape[1] :]
     return LayersOnLink(points, B, held[:, : B.shape[1]], by_volts, straight, f.T @ R @ by_volts)
@@ -159,11 +149,10 @@ def stiffness_ratios(placed: PlacedLayout, body: ModalBody) -> tuple[Array, Arra
     @cache
     def ratios(station: int) -> Array:
         rigidity = sections.rigidity[station]
-        C, f = felt_loads(layout, sections, station)
+        C, f, straight = felt_loads(layout, sections, station)
         strain = np.linalg.solve(np.diag(rigidity[felt]) + C[np.ix_(felt, felt)], f[felt])[np.searchsorted(felt, own)]
         psi = rigidity[STRETCH] / (layout.modulus * layout.width * layout.layers * layout.thickness)
-        straight = straight_loads(layout, *place_of(layout, sections, station))[own]
-        return np.array([psi, strain * rigidity[own] / straight])
+        return np.array([psi, strain * rigidity[own] / straight[own]])
 
     found = np.zeros((2, len(edges)))
     for at in gauss_points(body, edges):
@@ -194,22 +183,23 @@ def place_of(layout: PztLayout, sections: LinkSections, station: int) -> tuple[f
     return float(sections.extent(layout.normal, side(layout))[station]), lever
 
 
-def felt_loads(layout: PztLayout, sections: LinkSections, station: int) -> tuple[Array, Array]:
+def felt_loads(layout: PztLayout, sections: LinkSections, station: int) -> tuple[Array, Array, Array]:
     """Return stiffness C (4, 4) and loads per volt f (4,), SI, of the layers by strains that interact with patches.
 
-    Other strains are eliminated, as link and layers carry no load along them; C and f are 0 there.
+    Other strains are eliminated, as link and layers carry no load along them; C and f are 0 there. The third result is
+    f (4,) on a straight link.
     """
     every, of_volt = layer_loads(layout, *place_of(layout, sections, station))
     felt = felt_rows(layout)
     free = np.setdiff1d([row for row in (bending_row(layout), STRETCH, TWIST) if every[row].any()], felt)
     C, f = np.zeros((4, 4)), np.zeros(4)
     C[np.ix_(felt, felt)], f[felt] = every[np.ix_(felt, felt)], of_volt[felt]
-    rigidity = sections.rigidity[station, free]
+    rigidity, straight = sections.rigidity[station, free], f.copy()
     if free.size and not np.isnan(rigidity).any():
         across = np.linalg.solve(np.diag(rigidity) + every[np.ix_(free, free)], every[np.ix_(free, felt)])
         C[np.ix_(felt, felt)] -= every[np.ix_(felt, free)] @ across
         f[felt] -= across.T @ of_volt[free]
-    return C, f
+    return C, f, straight
 
 
 def _intervals(placed: Sequence[PlacedLayout]) -> tuple[Array, list[list[tuple[PztLayout, int]]]]:
@@ -228,12 +218,13 @@ def _intervals(placed: Sequence[PlacedLayout]) -> tuple[Array, list[list[tuple[P
 
 
 def _residual(exact: Array, of_modes: Array) -> Array:
-    """R, without what round-off and the difference of nominal and finite element stiffness make negative of it."""
+    """R = exact − A Aᵀ by A `of_modes`, without what differences of nominal and FE stiffness make negative of it."""
     if np.isnan(exact).any():
-        return np.zeros_like(of_modes)
-    scale = np.sqrt(exact)
-    values, turn = np.linalg.eigh(np.eye(len(exact)) - of_modes / np.outer(scale, scale))
-    return np.asarray((scale[:, None] * turn * values.clip(min=0.0)) @ (turn.T * scale))
+        return np.zeros((len(exact), len(exact)))
+    scale = np.sqrt(exact)[:, None]
+    left, sizes, _ = np.linalg.svd(of_modes / scale, full_matrices=False)
+    shapes = scale * left * sizes.clip(max=1.0)
+    return np.asarray(np.diag(exact) - shapes @ shapes.T)
 
 
 def _strains(body: ModalBody, x: Array) -> Array:
@@ -260,21 +251,21 @@ class Effects(NamedTuple):
     # (k, K) charges, F, as sensors by voltages of the K patches of the link; open ones are clamped, but for the strains
     # that modes lack
     capacitance: Array
+    yielding: Array  # (k, K) charges by voltages, F, by strains that modes lack
 
 
 def effects(placed: Sequence[PlacedLayout], body: ModalBody) -> list[Effects]:
     """Return the effects of each layout of one link, coupled by their stiffness if it counts."""
     found = [_straight(one, body) for one in placed]
     layouts, share = _each(placed)
-    stiff, opened = np.array([(of.adds_stiffness, of.electrodes == "open") for of in layouts]).T
-    lacking = np.zeros((len(layouts), body.mode_count))
+    opened = np.array([of.electrodes == "open" for of in layouts])
+    layers = layers_on_link(placed, body)
+    lacking = (layers.straight - layers.by_volts).T @ layers.B
     C = np.diag([of.capacitance(clamped=of.electrodes == "open") for of in layouts] * share)
-    if stiff.any():
-        _, lacking[stiff], yielding = composite([one for one in placed if one.layout.adds_stiffness], body)
-        C[np.ix_(opened, opened)] += yielding[np.ix_(opened[stiff], opened[stiff])]
+    C += np.outer(opened, opened) * layers.yielding
     ends = np.cumsum([len(one.edges) for one in placed])[:-1]
-    parts = zip(found, np.split(lacking, ends), np.split(C, ends), strict=True)
-    return [one._replace(Phi_V=one.Phi_V - part, capacitance=charges) for one, part, charges in parts]
+    parts = zip(found, *(np.split(of, ends) for of in (lacking, C, layers.yielding)), strict=True)
+    return [one._replace(Phi_V=one.Phi_V - part, capacitance=c, yielding=of) for one, part, c, of in parts]
 
 
 def _each(placed: Sequence[PlacedLayout]) -> tuple[list[PztLayout], Array]:
@@ -290,7 +281,8 @@ def _straight(placed: PlacedLayout, body: ModalBody) -> Effects:
     starts, ends, stations, first = _stretches(layout, body, sections, edges)
     alike, which = np.unique(sections.alike[stations], return_inverse=True)
     places = np.array([place_of(layout, sections, station) for station in alike.tolist()])
-    loads = np.array([straight_loads(layout, *place) for place in places])
+    felt = np.isin(np.arange(4), felt_rows(layout))
+    loads = np.array([felt * layer_loads(layout, *place)[1] for place in places])
     before, after = np.split(potentials(body, np.concatenate([starts, ends])), 2)
     differences = after - before
     of_stretch = np.stack([places[:, 0], loads[:, own], places[:, 1]])[:, which]
@@ -305,7 +297,7 @@ def _straight(placed: PlacedLayout, body: ModalBody) -> Effects:
             membrane /= 1.0 - (layout.poissons_ratio or 0.0)
         Phi_V = membrane[:, None] * _outlined(layout, body, edges)
     lever = lever / 2 if layout.bends == "twist" else np.ones(len(edges))
-    return Effects(extent, c, lever, turn, Phi_V, np.zeros((0, 0)))
+    return Effects(extent, c, lever, turn, Phi_V, *np.zeros((2, 0, 0)))
 
 
 def _stretches(
@@ -413,19 +405,21 @@ def patched_body(spatial: Body, body: ModalBody, placed: Sequence[PlacedLayout])
             masses.append(line_density * A)
             spins.append(line_density * (I + A * layout.width**2 / 12))
     stiff = [one for one in placed if one.layout.adds_stiffness]
-    added = T.T @ composite(stiff, body)[0] @ T if stiff else np.zeros((spatial.n_modes, spatial.n_modes))
-    patched = with_line_masses(spatial, points, np.array(masses), np.array(spins), added)
-    return _with_charges(patched, body, stiff) if any(one.layout.gives_way for one in stiff) else patched
+    added = np.zeros((spatial.n_modes, spatial.n_modes))
+    if stiff:
+        layers = layers_on_link(stiff, body)
+        added = T.T @ layers.B.T @ layers.by_modes @ T
+    patched = with_line_masses(spatial, points, np.array(masses), np.array(spins), (added + added.T) / 2)
+    return _with_charges(patched, layers, stiff) if any(one.layout.gives_way for one in stiff) else patched
 
 
-def _with_charges(patched: Body, body: ModalBody, placed: Sequence[PlacedLayout]) -> Body:
+def _with_charges(patched: Body, layers: LayersOnLink, placed: Sequence[PlacedLayout]) -> Body:
     """Return the body with the effect of the charges of patches with open electrodes, or a resistor of R Ω each.
 
     With the charge q = C V + Φᵀp and V = −R q̇ a patch has the dynamic stiffness Φ iωR/(1 + iωRC) Φᵀ (Hagood and von
     Flotow, J. Sound Vib. 146, 1991), ΦΦᵀ/C where R is infinite. Its stiffness and damping are those at the frequency
     of each mode that they lead to.
     """
-    layers = layers_on_link(placed, body)
     layouts, share = _each(placed)
     charged = np.flatnonzero([of.gives_way for of in layouts])
     C = np.diag([of.capacitance(clamped=True) for of in layouts] * share) + layers.yielding

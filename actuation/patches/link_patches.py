@@ -42,10 +42,8 @@ WIDE = 3.0  # of its length: a link that wide keeps its sections flat, whatever 
 class OnBody:
     """Effects of all k patches of a link on one body that carries them, on the n modes of the body's file."""
 
-    Phi_V: Array  # (n, k) modal forces per volt, N/(√kg·V)
-    turn: Array  # (n, k) rotation of the ends of each patch against each other by each mode, rad/(m·√kg)
     to_link: Array  # (modes of the link, n) modal forces on the modes of the link's file by those on these modes
-    charge: Array  # (n, k) of each patch per unit of each mode, C/(m·√kg): Φ_V, also where no voltage drives it
+    charge: Array  # (n, k) of each patch per unit of each mode, C/(m·√kg): Φ_V, whether or not voltages drive it
     capacitance: Array  # (k, k) charges of patches as sensors by voltages, F
 
 
@@ -60,6 +58,7 @@ class LinkPatches:
     reach: Reach  # of all patches side by side on the modes that they reach together
     bodies: Mapping[str, OnBody]  # by name, the link and, where it is divided, its pieces
     slowness: float  # √(ρA/EI) of the link, s/m²
+    static: Array  # (k, k) charges, F, by the strains of voltages that drive a link without loads
     # (n, n), without unit, from modal forces to the part that the equations keep; None: all of them
     on_kept: Array | None = None
 
@@ -71,7 +70,7 @@ class LinkPatches:
     @property
     def Phi_V(self) -> Array:
         """Modal forces per volt (n, k), N/(√kg·V), on the modes of the link's file."""
-        return self.bodies[self.body].Phi_V
+        return self.per_volt[self.body]
 
     def voltages(self, F_p: Array) -> dict[str, Voltages]:
         """Return voltages by layout for modal forces F_p (T, n), N/√kg; `unmet` is left by all layouts together."""
@@ -80,8 +79,9 @@ class LinkPatches:
 
     @property
     def amplifiers(self) -> Amplifiers:
-        """Amplifiers of the k patches."""
-        return self.reach.amplifiers
+        """Amplifiers of the k patches, their capacitances on a link without loads."""
+        of, driven = self.reach.amplifiers, driven_patches(self.arrays.values())
+        return replace(of, capacitance=of.capacitance + driven[:, None] * self.static)
 
     @property
     def edges(self) -> Array:
@@ -102,7 +102,7 @@ class LinkPatches:
     @property
     def per_volt(self) -> dict[str, Array]:
         """Modal forces per volt (n, k), N/(√kg·V), by body, on the modes of its file."""
-        return {name: of.Phi_V for name, of in self.bodies.items()}
+        return {name: of.charge * driven_patches(self.arrays.values()) for name, of in self.bodies.items()}
 
     @property
     def to_reached(self) -> dict[str, Array]:
@@ -145,7 +145,7 @@ class LinkPatches:
 
 def driven_patches(placed: Iterable[PlacedLayout | PatchArray]) -> Array:
     """Return whether voltages drive each patch (k,)."""
-    return np.concatenate([np.full(len(one.edges), one.layout.is_driven) for one in placed])
+    return np.array([one.layout.is_driven for one in placed for _ in one.edges])
 
 
 def placed_patches(layouts: Sequence[PztLayout], body: ModalBody) -> list[PlacedLayout]:
@@ -177,7 +177,7 @@ def link_patches(layouts: Sequence[PztLayout], body: ModalBody, spatial: Body) -
     placed = placed_patches(layouts, body)
     with naming(_key(*layouts)):
         found = effects(placed, body)
-    charge, turn = (np.concatenate(of).T for of in ([one.Phi_V for one in found], [one.turn for one in found]))
+    charge = np.concatenate([one.Phi_V for one in found]).T
     capacitance, driven = np.concatenate([one.capacitance for one in found]), driven_patches(placed)
     arrays = {one.layout.label: _array(one, body, spatial, of) for one, of in zip(placed, found, strict=True)}
     reach: Reach = next(iter(arrays.values()))
@@ -186,11 +186,13 @@ def link_patches(layouts: Sequence[PztLayout], body: ModalBody, spatial: Body) -
         reach = _together(layouts, arrays, reached, charge.T)
     if not driven.all():
         reach = replace(reach, Phi_V=reach.Phi_V * driven)
-    own = {layouts[0].body: OnBody(charge * driven, turn, np.eye(body.mode_count), charge, capacitance)}
+    own = {layouts[0].body: OnBody(np.eye(body.mode_count), charge, capacitance)}
     # √(ρA/EI) of the mode that bends the link most softly: ω² = ∫ EI φ''² dx
     bent = np.diff(body.stations.rotation[:, 1:], axis=0) ** 2 / np.diff(body.stations.position[:, 0])[:, None, None]
     softest = (bent.sum(axis=(0, 1)) / np.diag(body.stiffness)).max(initial=0.0)
-    return LinkPatches(arrays, reach, own, float(np.sqrt(body.mass / body.length * softest)))
+    on_modes = spatial.modal_transform.T @ charge
+    static = np.concatenate([one.yielding for one in found]) + (on_modes.T / spatial.stiffness) @ on_modes
+    return LinkPatches(arrays, reach, own, float(np.sqrt(body.mass / body.length * softest)), static * driven)
 
 
 def check_reach(of_link: LinkPatches) -> None:
@@ -235,18 +237,16 @@ def on_pieces(whole: LinkPatches, link: ModalBody, pieces: Mapping[str, tuple[fl
                 f"one at {cuts[through][0]:g} m: change pieces, or centers",
             )
     bodies = {whole.body: whole.bodies[whole.body]}
-    driven = driven_patches(whole.arrays.values())
     spread = spread_of(link, list(pieces.values()))
     ends = np.cumsum([modal.mode_count for _, modal in pieces.values()])
     for (name, (start, modal)), to_piece in zip(pieces.items(), np.split(spread, ends[:-1]), strict=True):
         on_piece = whole.placed_on(start, modal.length)
-        columns, k = [k for which, _ in on_piece for k in which], len(driven)
-        (charge, turn), capacitance = np.zeros((2, modal.mode_count, k)), np.zeros((k, k))
+        columns, k = [k for which, _ in on_piece for k in which], len(whole.edges)
+        charge, capacitance = np.zeros((modal.mode_count, k)), np.zeros((k, k))
         found = effects([placed for _, placed in on_piece], modal) if on_piece else []
         for (which, _), of in zip(on_piece, found, strict=True):
-            charge[:, which], turn[:, which] = of.Phi_V.T, of.turn.T
-            capacitance[np.ix_(which, columns)] = of.capacitance
-        bodies[name] = OnBody(charge * driven, turn, to_piece.T, charge, capacitance)
+            charge[:, which], capacitance[np.ix_(which, columns)] = of.Phi_V.T, of.capacitance
+        bodies[name] = OnBody(to_piece.T, charge, capacitance)
     return replace(whole, bodies=bodies)
 
 
@@ -277,7 +277,6 @@ def _array(placed: PlacedLayout, body: ModalBody, spatial: Body, of: Effects) ->
         layout=layout,
         edges=edges,
         effects=of,
-        turn=modes.forces(of.turn).T,
         link=body,
     )
 
@@ -291,7 +290,8 @@ def _together(
             beside = f'with other layouts on "{layout.body}"'
             raise InputError(f"{_key(layout)}: expected no weights {beside}", "them")
     Phi_V = reached.forces(per_volt).T
-    return Reach(reached, Phi_V, joined(arrays.values()), served_first(reached.served, *Phi_V.shape))
+    amplifiers = joined(of.amplifiers for of in arrays.values())
+    return Reach(reached, Phi_V, amplifiers, served_first(reached.served, *Phi_V.shape))
 
 
 def _key(layout: PztLayout, *others: PztLayout) -> str:
@@ -306,12 +306,10 @@ def on_kept_modes(of_link: LinkPatches, equations: Body) -> LinkPatches:
     """
     if equations.reduction is None or of_link.reach.serves_all:
         return of_link
-    on_link, arrays = of_link.bodies[of_link.body], {}
+    Phi_V, arrays = of_link.Phi_V, {}
     for layout, array in of_link.arrays.items():
-        columns = of_link.columns(layout)
-        changed = replace(array, **_on_kept(array, on_link.Phi_V[:, columns], equations))
-        arrays[layout] = replace(changed, turn=changed.modes.forces(on_link.turn[:, columns].T).T)
-    reach = replace(of_link.reach, **_on_kept(of_link.reach, on_link.Phi_V, equations))
+        arrays[layout] = replace(array, **_on_kept(array, Phi_V[:, of_link.columns(layout)], equations))
+    reach = replace(of_link.reach, **_on_kept(of_link.reach, Phi_V, equations))
     return replace(of_link, arrays=arrays, reach=reach, on_kept=equations.modal_transform @ equations.on_file)
 
 

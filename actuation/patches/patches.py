@@ -207,8 +207,6 @@ class PatchArray(Reach):
     layout: PztLayout  # the keys of the scene
     edges: Array  # (k, 2) where each patch begins and ends along the link, m
     effects: Effects  # effects on the modes of the `link`
-    # (n, k) rotation of the ends of each patch against each other by the n `modes`, rad/(m·√kg)
-    turn: Array
     link: ModalBody  # modal body of the link
 
     @property

@@ -286,7 +286,7 @@ class PztLayout(Record):
             range=range,
             slew=each(of.slew),
             current=each(of.current),
-            capacitance=each(self.capacitance(clamped=True)),
+            capacitance=self.capacitance(clamped=True) * np.eye(k),
             bandwidth=each(of.bandwidth),
             delay=each(of.delay),
             plays=plays,

@@ -198,11 +198,3 @@ def layer_loads(layout: PztLayout, extent: float, lever: float) -> tuple[Array, 
     else:
         f[axial], f[TWIST] = n_x * np.array([-sign * A, arm, sign * A * middle]), -sign * n_s * lever * arm
     return C, f
-
-
-def straight_loads(layout: PztLayout, extent: float, lever: float) -> Array:
-    """Return loads per volt (4,), N·m/V and N/V, of layers on a straight link; 0 along strains they do not affect."""
-    f = np.zeros(4)
-    rows = felt_rows(layout)
-    f[rows] = layer_loads(layout, extent, lever)[1][rows]
-    return f

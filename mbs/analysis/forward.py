@@ -21,7 +21,7 @@ from ..model.model import Model
 from ..model.system import motor_commands
 from ..posture.posture import mobility
 from ..posture.start import displaced_joints, undeformed_posture
-from ..run.context import Context, PatchedLink
+from ..run.context import Context, PatchedLink, amplifiers_on, strain_directions
 from ..run.drive import drive_robot
 from ..run.gears import DEGREE, with_motor_coordinates
 from ..run.record import Run
@@ -139,8 +139,7 @@ def _replayed(context: Context, model: Model, source: Run, analysis: Forward) ->
 
 def actuator_commands(model: Model, patches: Mapping[str, PatchedLink]) -> tuple[Command, ...]:
     """Generalized forces of unit commands: of motors, N·m or N, on sections or frames; of patches, V, on link modes."""
-    of_volts = (row for of_link in patches.values() for row in model.modal_directions(of_link.per_volt))
-    return (*motor_commands(model), *map(Command, of_volts))
+    return (*motor_commands(model), *map(Command, strain_directions(model, patches)))
 
 
 def numbers_of_motors(model: Model) -> dict[str, list[int]]:
@@ -181,18 +180,12 @@ def _behind_gears(source: Run, model: Model, analysis: Forward, context: Context
 def command_ranges(model: Model, patches: Mapping[str, PatchedLink]) -> Array:
     """Limits (2, inputs) of commands, lowest and highest: of motors, N·m or N, then of patches, V; infinite if none."""
     most = largest_moments(model, limits=True)
-    return np.hstack([np.stack([-most, most]), joined(patches.values()).range])
-
-
-def strain_directions(model: Model, patches: Mapping[str, PatchedLink]) -> Array:
-    """Matrix (k, n_v) from v (n_v,), SI units, to the currents Φ_Vᵀ ṗ, A, of all k patches."""
-    rows = [model.modal_directions(of_link.per_volt) for of_link in patches.values()]
-    return np.concatenate([np.zeros((0, model.tree.n_v)), *rows])
+    return np.hstack([np.stack([-most, most]), joined(of.amplifiers for of in patches.values()).range])
 
 
 def _supplied(source: Run, most: Array, patches: Mapping[str, PatchedLink], analysis: Forward) -> _core.ForceSource:
     """What motors and amplifiers make of what `source` found: its charges are those of its own motion."""
-    forces, amplifiers = supplied(source, most, patches, limited=analysis.limits), joined(patches.values())
+    forces, amplifiers = supplied(source, most, patches, limited=analysis.limits), amplifiers_on(source.model, patches)
     amplifiers = amplifiers if analysis.limits else amplifiers.unlimited()
     if not amplifiers.acts:
         return forces

@@ -1,7 +1,8 @@
 """Amplifiers of patches: limits, the current that a motion takes, and the voltages that arrive for wanted ones.
 
 A patch is a capacitor that its link stretches. By reciprocity its charge is q = C V + Φ_Vᵀ p: Φ_V are the modal forces
-of a volt, C is the capacitance of the patch on a link that stands still (Lee and Moon, J. Appl. Mech. 57, 1990).
+of a volt, C is the capacitance on a link whose modes stand still (Lee and Moon, J. Appl. Mech. 57, 1990). Other strains
+follow the voltages of all patches at once, and are part of C.
 
 Of a voltage V over time the play operator of threshold r has z = max(V − r, min(V + r, z)), and a patch acts as under
 the voltage Σ w z (Prandtl and Ishlinskii). The inverse has the same form (Kuhnen, Eur. J. Control 9, 2003, eq. 20).
@@ -11,14 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import fields, replace
-from typing import Protocol
 
 import numpy as np
 
 from ...common.arrays import Array
+from ...common.libraries import scipy
 from ...common.structs import struct
 
 MOST_PLAYS = 32
+PASSES = 30  # at most, until voltages at limits of current agree
 CHUNK = 1024  # voltages, all on one way up or down, whose play operators are found together
 
 
@@ -84,7 +86,7 @@ class Amplifiers:
     range: Array  # (2, k) smallest and largest voltage, V
     slew: Array  # (k,) largest rate of the voltage, V/s
     current: Array  # (k,) largest current, A
-    capacitance: Array  # (k,) F, of patches on a link that stands still
+    capacitance: Array  # (k, k) F, of patches on a link whose modes stand still
     bandwidth: Array  # (k,) of first order, Hz
     delay: Array  # (k,) s
     plays: Array  # (2, MOST_PLAYS, k) weights and thresholds of the patches' hysteresis
@@ -138,9 +140,14 @@ class Amplifiers:
         after = last - late + (now - first + late) * decay
         mean = (first + last) / 2 - late + (now - first + late) * share
         unlimited = np.isinf(self.current)  # of which no capacitance is known
-        left = (np.where(unlimited, np.inf, (self.current - s) / self.capacitance) for s in (strain, -strain))
-        most, least = (h * np.minimum(self.slew, of) for of in left)
-        kept = np.clip(np.clip(after, now - least, now + most), *self.range)
+        own, kept = self.capacitance.diagonal(), after
+        for _ in range(PASSES):
+            felt = strain + (self.capacitance @ (kept - now) - own * (kept - now)) / h
+            left = (np.where(unlimited, np.inf, (self.current - s) / own) for s in (felt, -felt))
+            most, least = (h * np.minimum(self.slew, of) for of in left)
+            before, kept = kept, np.clip(np.clip(after, now - least, now + most), *self.range)
+            if np.array_equal(kept, before):
+                break
         most = np.where(kept > now, most, least)
         ramp = kept - (kept - now) * np.abs(kept - now) / (2 * most)
         mean = np.where(np.abs(ramp - now) < np.abs(mean - now), ramp, mean)
@@ -160,17 +167,11 @@ class Amplifiers:
         return self.hysteresis.output(limited)
 
 
-class Driven(Protocol):
-    """Protocol of objects with patch amplifiers."""
-
-    @property
-    def amplifiers(self) -> Amplifiers:
-        """Amplifiers of its patches."""
-
-
-def joined(links: Iterable[Driven]) -> Amplifiers:
+def joined(links: Iterable[Amplifiers]) -> Amplifiers:
     """Return the amplifiers of all patches of `links`, in this order."""
     none = {field.name: np.zeros(0) for field in fields(Amplifiers)}
-    none |= {"range": np.zeros((2, 0)), "plays": np.zeros((2, MOST_PLAYS, 0))}
-    parts = [none, *(vars(of_link.amplifiers) for of_link in links)]
-    return Amplifiers(**{key: np.concatenate([of[key] for of in parts], axis=-1) for key in none})
+    none |= {"range": np.zeros((2, 0)), "plays": np.zeros((2, MOST_PLAYS, 0)), "capacitance": np.zeros((0, 0))}
+    parts = [none, *map(vars, links)]
+    found = {key: [of[key] for of in parts] for key in none}
+    C = scipy.linalg.block_diag(*found.pop("capacitance"))
+    return Amplifiers(capacitance=C, **{key: np.concatenate(of, axis=-1) for key, of in found.items()})

@@ -188,6 +188,10 @@ class Model:
                 directions[:, node.p_v] = on_modes[node.body.name].T @ node.body.modal_transform
         return directions
 
+    def compliance(self, forces: Array, others: Array) -> Array:
+        """Return static deflections (k, m) of modes by generalized `forces` (k, n_v) along `others` (m, n_v)."""
+        return np.sum([forces[:, of.p_v] / of.body.stiffness @ others[:, of.p_v].T for of in self.tree.nodes], axis=0)
+
     @cached_property
     def size(self) -> float:
         """Size of the robot, m: the largest distance of two named points of a body, or 1 m without any."""

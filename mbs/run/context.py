@@ -1,13 +1,15 @@
 """What an analysis may use when it runs. SI units."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import KW_ONLY, field
+from dataclasses import KW_ONLY, field, replace
 from typing import Protocol, TypeVar
+
+import numpy as np
 
 from ...common.arrays import Array
 from ...common.structs import struct
 from .. import _core
-from ..model.amplifiers import Amplifiers
+from ..model.amplifiers import Amplifiers, joined
 from ..model.divided_link import DividedLink
 from ..model.known_motion import State
 from ..model.model import Model
@@ -27,7 +29,7 @@ class PatchedLink(Protocol):
 
     @property
     def amplifiers(self) -> Amplifiers:
-        """Amplifiers of its patches."""
+        """Amplifiers of its patches, their capacitances on a link without loads."""
 
     @property
     def edges(self) -> Array:
@@ -43,6 +45,18 @@ class PatchedLink(Protocol):
 
     def allocation(self, *, limited: bool) -> _core.Allocation:
         """Return the map from m modal forces to k voltages, with limits of the patches or without."""
+
+
+def strain_directions(model: Model, patches: Mapping[str, PatchedLink]) -> Array:
+    """Matrix (k, n_v) from v (n_v,), SI units, to the currents Φ_Vᵀ ṗ, A, of all k patches."""
+    rows = [model.modal_directions(of_link.per_volt) for of_link in patches.values()]
+    return np.concatenate([np.zeros((0, model.tree.n_v)), *rows])
+
+
+def amplifiers_on(model: Model, patches: Mapping[str, PatchedLink]) -> Amplifiers:
+    """Return the amplifiers of all patches, their capacitances where modes of the model stand still."""
+    of, Phi_V = joined(of.amplifiers for of in patches.values()), strain_directions(model, patches)
+    return replace(of, capacitance=of.capacitance - model.compliance(Phi_V, Phi_V))
 
 
 class PointsOfBody(Protocol):

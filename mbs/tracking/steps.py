@@ -335,7 +335,7 @@ class Steps:
             limited["slew"] = values(self.voltages.by_z(within, 1))
         if charges[0].shape[1]:
             rates = np.einsum("ij,Njmz->Nimz", OF_FIFTHS, self.voltages.by_z(FIFTHS, 1))
-            limited["current"] = values(C[:, None] * rates, *charges)
+            limited["current"] = values(C @ rates, *charges)
         return limited
 
     def _inequalities(self, values: Mapping[str, tuple[Array, Array]]) -> tuple[Array, Array]:

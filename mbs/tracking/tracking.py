@@ -23,9 +23,8 @@ from ..inversion.motors_only import AroundPath, check_rest, durations, outcome_a
 from ..inversion.servo import Servo, Stopped, make_servo
 from ..inversion.stable_inversion import with_corners
 from ..inversion.zero_dynamics import equilibrium, linearise
-from ..model.amplifiers import joined
 from ..model.model import Model
-from ..run.context import Context, PatchedLink
+from ..run.context import Context, PatchedLink, amplifiers_on, strain_directions
 from ..run.integrators import Choice
 from ..run.record import Run, Statistics
 from ..scene.analysis import Check, Need, Robustness, TimedAnalysis, output_times
@@ -212,9 +211,8 @@ def _pose(model: Model, patches: Mapping[str, PatchedLink], analysis: Tracking, 
     servo = with_gears(make_servo(model, end, progress, analysis.kind))
     check_rest(servo, analysis, (0.0, end))
     gears = servo.gears if isinstance(servo, GearedServo) else None
-    per_volt = [servo.model.modal_directions(of_link.per_volt) for of_link in patches.values()]
-    Phi_V = np.concatenate(per_volt)[:, servo.of_modes].T  # (n, k) on all modes, of all patches of all links
-    limits = Limits(joined(patches.values()), largest_moments(model, limits=True))
+    Phi_V = strain_directions(servo.model, patches)[:, servo.of_modes].T  # (n, k) on all modes
+    limits = Limits(amplifiers_on(model, patches), largest_moments(model, limits=True))
     if not np.any(Phi_V):
         raise InputError('expected patches on flexible links for kind = "tracking"', "none that bend one")
     linear = linearise(servo, end)

@@ -111,7 +111,7 @@ class Transition:
         pairs = {
             "voltage": (of.range, both * weights.voltage),
             "slew": (both * of.slew, both * rate),
-            "current": (both * of.current, both * rate * of.capacitance),
+            "current": (both * of.current, both * rate * of.capacitance.diagonal()),
             "torque": (both * self.limits.torque, both * weights.torque),
         }
         ranges = {name: np.where(np.isfinite(limit), limit, size) for name, (limit, size) in pairs.items()}

@@ -1,5 +1,7 @@
 """Amplifiers of patches: responses in closed form, currents by charges, and limits in tracking, replays and loops."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import test_tracking_arms
@@ -22,7 +24,7 @@ def output(wanted, strain=0.0, **keys):
     """What arrives of a voltage over `TIME`, at a patch with 1 nF or so."""
     amplifiers = layout(count=1, amplifier=keys).amplifiers()
     columns = (np.broadcast_to(of, TIME.shape)[:, None] for of in (wanted, strain))
-    return amplifiers.output(TIME, *columns)[:, 0], float(amplifiers.capacitance[0])
+    return amplifiers.output(TIME, *columns)[:, 0], float(amplifiers.capacitance[0, 0])
 
 
 def test_responses_in_closed_form():
@@ -39,6 +41,17 @@ def test_responses_in_closed_form():
     of, none = layout(count=1, amplifier={"slew": 5e3}).amplifiers(), np.zeros(1)
     at_end, mean = of.advance(1e-3, none, (none + 2.0, none + 2.0), none)
     assert (at_end, mean) == pytest.approx((2.0, 1.6))  # a ramp for 0.4 of the step
+
+
+def test_currents_of_patches_that_charge_each_other():
+    """Both at the limit: C V̇ + c V̇ = i; the second alone, with the charge of the first's ramp."""
+    of = replace(
+        layout(count=2, amplifier={"current": 2e-6}).amplifiers(), capacitance=np.array([[4e-9, 1e-9], [1e-9, 4e-9]])
+    )
+    time = TIME[::20, None]
+    for ramps, rates in (((1e4, 1e4), (400.0, 400.0)), ((-100.0, 1e4), (-100.0, 525.0))):
+        found = of.output(time[:, 0], time * ramps, 0.0 * time * ramps)
+        np.testing.assert_allclose(found, time * rates, atol=1e-10)
 
 
 def test_capacitance():

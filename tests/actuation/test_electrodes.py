@@ -9,12 +9,13 @@ from one_link import one_link
 from patches_on_links import SCENE, patched
 
 import ffrobot
-from ffrobot.actuation.control.signals import volts_on_file
 from ffrobot.actuation.patches.link_patches import link_patches
 from ffrobot.actuation.patches.records import PztLayout
 from ffrobot.common.errors import InputError
 from ffrobot.common.validation import validate
 from ffrobot.mbs.model.body import from_modal_body
+from ffrobot.mbs.run.context import amplifiers_on, strain_directions
+from ffrobot.run.solve import prepare_scene
 
 E, L, H, B = 70e9, 0.3, 0.004, 0.02
 E_P, D31, T_P, EPS = 61e9, -179e-12, 1e-3, 1700 * 8.8541878128e-12
@@ -36,6 +37,12 @@ def layout(**keys):
     return validate(PztLayout, PATCH | keys, SCENE)
 
 
+def read_by_modes(of_link, body):
+    """Readings by the modal coordinates of the equations, V/(m·√kg)."""
+    own = of_link.bodies["strip"]
+    return np.linalg.solve(own.capacitance, own.charge.T) @ body.modal_transform
+
+
 @pytest.mark.parametrize("count", [1, 3])
 def test_open_patches_along_a_cantilever_under_a_force_at_its_tip(strip, count):
     """EI κ = M + c V, c ∫κ dx + C V = 0 on each patch of length l: the tip moves by (F L³/3 + Σ c V l (L − x))/EI."""
@@ -49,7 +56,7 @@ def test_open_patches_along_a_cantilever_under_a_force_at_its_tip(strip, count):
         body = patched(strip, one := layout(electrodes=electrodes, **keys))
         tip = body.points["tip"].translation[1]
         assert tip**2 @ (1.0 / body.stiffness) == pytest.approx(expected, rel=1e-6)
-    volts = volts_on_file(link_patches([one], strip, body), "strip")["strip"] @ body.modal_transform
+    volts = read_by_modes(link_patches([one], strip, body), body)
     assert volts @ (tip / body.stiffness) == pytest.approx(-V, rel=1e-6)
 
 
@@ -93,7 +100,7 @@ def test_readings_of_a_patch_under_a_force_at_the_tip(electrodes, face, offset, 
     body = modal_body(LINK | {"modes": keys})
     keys = PATCH | PLACE | {"width": w, "face": face, "offset": offset, "electrodes": electrodes}
     spatial = patched(body, one := validate(PztLayout, keys, SCENE, None, "spatial"))
-    volts = volts_on_file(link_patches([one], body, spatial), "strip")["strip"] @ spatial.modal_transform
+    volts = read_by_modes(link_patches([one], body, spatial), spatial)
     found = volts[0] @ (force @ spatial.points["tip"].translation / spatial.stiffness)
     faces, sign = (2, 0.0) if face == "both" else (1, 1.0)
     A, arm, I = (faces * w * np.diff([(H / 2) ** k, (H / 2 + T_P) ** k])[0] / k for k in (1, 2, 3))  # noqa: E741
@@ -107,6 +114,36 @@ def test_readings_of_a_patch_under_a_force_at_the_tip(electrodes, face, offset, 
     if electrodes == "open":
         C += length * (f @ np.linalg.solve(K, f) - A / T_P**2 * E_P * D31**2)
     assert found == pytest.approx(charge / C, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("strip", "structural"),
+    [({}, True), ({}, False), ({"count": 8, "pieces": 2}, True), ({"count": 8, "modes": 2}, True)],
+)
+def test_slow_charges_and_readings_by_any_number_of_modes(strip, structural):
+    """q = C V + c² l V/EI of a pair alone, read without C V; gauges and pairs beside it read loads alone."""
+    of_body, far = {"count": 2} | strip, 0.2
+    modes = {"count": of_body.pop("count"), "family": "in-plane-bending"}
+    link = LINK | {"modes": modes, "stress": {"points": {"gauge": [0.14, -H / 2, 0.0]}}}
+    seen = {"name": "seen", "kind": "linear", "sensor": [{"pzt": "strip"}, {"strain": "strip.gauge"}]}
+    pairs = [PATCH | {"centers": [0.06, far], "length": 0.1, "structural": ["stiffness"] if structural else False}]
+    scene = one_link("strip", link, seen, body=[{"name": "strip", "link": link} | of_body], pzt=pairs)
+    names = [*(f"pzt/strip/{k}" for k in (1, 2)), "strain/strip.gauge"]
+    model = ffrobot.solve(scene).linear("seen")[0]
+    by_volt, by_force = (
+        model.frequency_response(1e-3 * np.ones(1), of, names)[0, :, 0] for of in (names[0], "force/strip.tip/y")
+    )
+    A, S, I = (2 * B * np.diff([(H / 2) ** k, (H / 2 + T_P) ** k])[0] / k for k in (1, 2, 3))  # noqa: E741
+    bare, c, free = E * B * H**3 / 12, E_P * D31 * S / T_P, A * 0.1 / T_P**2 * EPS
+    EI = bare + E_P * I * structural
+    np.testing.assert_allclose(by_volt, [c**2 * 0.1 / EI / free, 0.0, 0.0], rtol=1e-6, atol=1e-9)
+    prepared = prepare_scene(scene)
+    Phi_V = strain_directions(prepared.model, prepared.patches)
+    found = amplifiers_on(prepared.model, prepared.patches).capacitance + prepared.model.compliance(Phi_V, Phi_V)
+    clamped = free - A * 0.1 / T_P**2 * E_P * D31**2
+    np.testing.assert_allclose(found, (clamped + c**2 * 0.1 / EI) * np.eye(2), rtol=1e-9, atol=1e-9 * clamped)
+    if not of_body:
+        assert by_force[1:] == pytest.approx([c * 0.1 * (L - far) / EI / free, (L - 0.14) * H / 2 / bare], rel=1e-6)
 
 
 def test_voltages_leave_out_passive_patches(strip):

@@ -16,7 +16,7 @@ def amplifiers(limit):
     none, zeros = np.full_like(limit, np.inf), np.zeros_like(limit)
     plays = np.zeros((2, MOST_PLAYS, len(limit)))
     plays[0, 0] = 1.0
-    return Amplifiers(np.stack([-limit, limit]), none, none, np.ones_like(limit), none, zeros, plays, zeros)
+    return Amplifiers(np.stack([-limit, limit]), none, none, np.eye(len(limit)), none, zeros, plays, zeros)
 
 
 @dataclass(frozen=True)
