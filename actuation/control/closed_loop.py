@@ -108,7 +108,7 @@ class ClosedLoop(SampledAnalysis):
         if observed is not None and states is not None:
             estimate = observed.record(_true_values(task, states[: loop.taken]))
         with run.arithmetic:
-            error = np.linalg.norm(_position(run.model, run.q, task.tip) - place_at(run.time), axis=1)
+            error = np.linalg.norm(position(run.model, run.q, task.tip) - place_at(run.time), axis=1)
             # not of slower sensors, whose loops are not the same from sample to sample
             loops = () if loop.is_slow else _loops_with_filters(task, laws)
             record = loop_record(self, setup, loop, acting, motion, loops=loops, lowest=lowest)
@@ -314,7 +314,7 @@ def _followed(
     model = run.model
     signs = np.array([model.sign(joint) for joint, of in model.motors.items() for _ in of])
     rates = signs * run.v[:, model.motor_columns]
-    error = _position(model, run.q, task.tip) - place_at(run.time)
+    error = position(model, run.q, task.tip) - place_at(run.time)
     return LoopMotion(
         time=run.time,
         error=error,
@@ -335,7 +335,7 @@ def _place_of_tip(task: LoopTask) -> Callable[[Array], Array]:
     """
     tip, run, rest = task.tip, task.source.closer, commanded_rest(task.source)
     paths = [path.components for path in task.plant.scene.trajectory if path.point == tip]
-    known = scipy.interpolate.CubicSpline(run.time, _position(run.model, run.q, tip))
+    known = scipy.interpolate.CubicSpline(run.time, position(run.model, run.q, tip))
 
     def place_at(time: Array) -> Array:
         place: Array = known(time)
@@ -343,13 +343,14 @@ def _place_of_tip(task: LoopTask) -> Callable[[Array], Array]:
             for component, target in components.items():
                 place[:, "xyz".index(component)] = target.sample(np.clip(time, 0.0, task.analysis.last_time))[0]
         if rest is not None:
-            place[time >= rest.since] = _position(rest.model, rest.q[None], tip)[0]
+            place[time >= rest.since] = position(rest.model, rest.q[None], tip)[0]
         return place
 
     return place_at
 
 
-def _position(model: Model, q: Array, point: str) -> Array:
+def position(model: Model, q: Array, point: str) -> Array:
+    """Return places (T, d), m, of a `point` at q (T, n_q), m and rad."""
     return model.tree.places(q).at(model.tree.section(point)).r
 
 

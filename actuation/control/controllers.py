@@ -241,8 +241,8 @@ def gains(model: SampledModel, Q: Array, R: Array) -> Array:
     """
     n, waiting = len(Q), (len(model.A) - len(Q)) // len(R)
     # in the unit of what is acceptable: all weights are one
-    scale = np.concatenate([1 / np.sqrt(np.diag(Q)), *[1 / np.sqrt(np.diag(R))] * waiting])
     unit = 1 / np.sqrt(np.diag(R))
+    scale = np.concatenate([1 / np.sqrt(np.diag(Q)), *[unit] * waiting])
     A, B = model.A * scale / scale[:, None], model.B * unit / scale[:, None]
     weight = np.diag(np.concatenate([np.ones(n), np.full(len(A) - n, 1e-9)]))
     X = riccati(A, B, weight, np.eye(len(R)))

@@ -97,7 +97,8 @@ def joint_gains(model: LinearModel, records: Sequence[JointPid], T: float) -> Fe
                 P[at] += record.proportional.get(joint, 0.0)
                 (D if record.rate == "measured" else difference)[at] += record.derivative.get(joint, 0.0)
                 integral[at] += record.integral.get(joint, 0.0)
-    o, none = len(P[0]), np.zeros((len(P[0]), len(P[0])))
+    o = len(P[0])
+    none = np.zeros((o, o))
     names = (*model.output_names, *(f"{name}/rate" for name in model.output_names))
     used = np.append(difference.any(axis=0), integral.any(axis=0))  # sums without a gain would stay at 1
     into = np.block([[np.eye(o), none], [T * np.eye(o), none]])

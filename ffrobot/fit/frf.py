@@ -351,7 +351,7 @@ def fit_receptances(
     fitted = list(compress(poses, used))
     averaged = {pose.test.averages is not None for pose in fitted}
     seen = {bool(known) for pose in fitted for known in pose.coherence.ravel() >= 0.0}
-    if len(averaged) + len(seen) > 2:  # some would count as if known to a factor of e
+    if len(averaged) + len(seen) > 2:
         raise InputError("fit: expected coherence, and averages, of all fitted FRFs or of none", "them of some")
 
     def of_used(values: Array) -> list[Array]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..actuation.context import ActuatedContext
-from ..actuation.control.closed_loop import ClosedLoop
+from ..actuation.control.closed_loop import ClosedLoop, position
 from ..actuation.control.records import JointPid, Sensor
 from ..actuation.control.robot import ControlledRobot, default_tip
 from ..common.arrays import Array
@@ -127,7 +127,7 @@ class _Runs:
             "output_step": getattr(given, "output_step", 0.0),
             "tolerance": min(given.tolerance, LOOSEST),
         }
-        self.wanted = [_positions(source, point) for point in self.points]
+        self.wanted = [position(source.model, source.q, point) for point in self.points]
         self.controller = self._controller()
 
     def _controller(self) -> dict[str, Any]:
@@ -199,12 +199,8 @@ class _Runs:
             if simulated.failed or len(simulated.time) < len(self.source.time):
                 return np.inf
             offs = (
-                np.linalg.norm(_positions(simulated, p) - at, axis=1)
+                np.linalg.norm(position(simulated.model, simulated.q, p) - at, axis=1)
                 for p, at in zip(self.points, self.wanted, strict=True)
             )
             most = max(most, *(float(off.max()) for off in offs))
         return most
-
-
-def _positions(run: Run, point: str) -> Array:
-    return run.model.tree.places(run.q).at(run.model.tree.section(point)).r

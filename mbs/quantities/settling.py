@@ -58,7 +58,7 @@ class Rest(NamedTuple):
 
 
 def commanded_rest(commanding: Run, since: float | None = None) -> Rest | None:
-    """Return the final posture of a run on paths, which are over at time `since`, s, by default as `_end` finds.
+    """Return the final posture of a run on paths, over at `since`, s, or as `_end` finds.
 
     None if paths last to its end, the robot can move freely, the run did not complete, or no equilibrium is near its
     last posture.
