@@ -134,7 +134,8 @@ template <class Space> void bind_model(nb::class_<Model<Space>> model) {
           "keep_independent_rows",
           [](Model<Space> &model, const VectorXd &q, const VectorXd &v) {
             model.check_state(q, v);
-            return keep_independent_constraints(q.data(), v.data(), model.w);
+            keep_independent_constraints(q.data(), v.data(), model.w);
+            return model.w.active;
           },
           "q"_a, "v"_a, "Numbers of constraint equations that are independent at a state; only these are kept.")
       .def("measure", &constraint_values_of<Space>, "q"_a, "v"_a, "Values and rates of constraint equations.")

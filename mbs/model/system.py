@@ -182,8 +182,7 @@ class MultibodySystem:
             for load in one.loads:
                 scene.add_cut_load(number, load, one.row.sign)
         scene.modal_amplitude_limits = [node.body.largest_moment for node in self.model.tree.nodes]
-        scene.has_loops = bool(self.model.loop_rows.any())
-        scene.keeps_all_rows = not scene.has_loops  # `check_path` refuses paths whose rows depend on each other
+        scene.has_loops = bool(self.model.loop_rows.any())  # else `check_path` refuses rows that depend on each other
         return scene
 
     def _wrench(self, section: Section) -> int:

@@ -100,8 +100,8 @@ FAULTS = [
           "J(Eigen::all, ways) /= length;", TREE),
     Fault(RECURSION + "motion/mobility.cpp", "free * path.null_space(followed())",
           "free * path.null_space(followed() + 1)", TREE),
-    Fault(RECURSION + "motion/independent_constraints.cpp", "slight * largest", "0 * largest",
-          MBS + "recursion/test_motion.py"),
+    Fault(RECURSION + "motion/independent_constraints.cpp", "S(i, i) < S(j, j)",
+          "S(i, i) / own[i] < S(j, j) / own[j]", MBS + "recursion/test_motion.py"),
     Fault(CORE + "/linear/dense.cpp", "values[rank - 1] / values[0]", "values[rank - 1]", TREE),
 ]  # fmt: skip
 

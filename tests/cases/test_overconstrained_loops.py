@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from beam_links import beam_link, rectangle
 from four_bar import LENGTHS, SIDES, closed, in_3d
-from tables_3d import Z, revolute, rigid, scene
+from tables_3d import Z, joint, pin, planar, revolute, rigid, scene, solved
 
 import ffrobot
 
@@ -71,6 +71,54 @@ def test_bennetts_linkage(flexible):
         assert left < 1e-4 * size
         np.testing.assert_allclose(run["again/joints/J1/coordinate"], q[0], atol=1e-5)
         assert not any("singular" in text for texts in run.warnings.values() for text in texts)
+
+
+def reactions(run, analysis="free"):
+    return [run[f"{analysis}/joints/J{k}/{part}"] for k in (1, 2, 3, 4) for part in ("reaction", "reaction_moment")]
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "radau"])
+def test_a_rigid_linkage_turns_over(integrator):
+    """Over full turns each constraint equation depends on others somewhere, and is needed elsewhere.
+
+    The least split of reactions does not depend on where the loop is cut.
+    """
+    tables = bennett(())
+    tables |= {"trajectory": [], "initial": tables["initial"] | {"joint_rates": {"J1": 12.0}}}
+    free = {"name": "free", "kind": "forward", "end": 1.5, "output_step": 0.01, "tolerance": 1e-8}
+    tables["analysis"] = [free | {"integrator": integrator}]
+    with solved(tables) as run:
+        q = [run[f"free/joints/J{k}/coordinate"] for k in (1, 2)]
+        kinetic = run["free/energy/kinetic"]
+        energy = kinetic + run["free/energy/gravitational"]
+        found = reactions(run)
+    assert np.ptp(q[0]) > 2 * np.pi
+    assert np.abs(np.angle(np.exp(1j * (q[1] - second(q[0]))))).max() < 1e-9
+    assert np.ptp(energy) < 1e-7 * np.ptp(kinetic)
+    with solved(tables | {"joint": tables["joint"][::-1]}) as run:
+        for one, other in zip(found, reactions(run), strict=True):
+            np.testing.assert_allclose(other, one, atol=1e-5 * np.abs(one).max())
+
+
+def test_two_pins_hold_as_a_weld():
+    """In the plane: a turning bar, to which another one is pinned at both ends, with a third at its end."""
+    found = []
+    for is_welded in (True, False):
+        bodies = [
+            {"name": name, "rigid": {"mass": mass, "center": [0.2, 0.0], "inertia": 0.01, "points": points}}
+            for name, mass in (("a", 1.0), ("b", 0.7), ("c", 0.3))
+            for points in [{"root": [0.0, 0.0], "tip": [0.5, 0.0]}]
+        ]
+        joints = [pin("j", "ground", "a.root"), pin("e", "b.tip", "c.root")]
+        joints += [joint("k", "weld", "a.root", "b.root")] if is_welded else [
+            pin("k", "a.root", "b.root"), pin("l", "a.tip", "b.tip")
+        ]  # fmt: skip
+        run = {"name": "free", "kind": "forward", "end": 2.0, "output_step": 0.1, "tolerance": 1e-9}
+        start = {"joints": {"j": 0.3, "e": 0.4}, "joint_rates": {"j": 5.0}}
+        with solved(planar(bodies, joints, run, initial=start)) as results:
+            found.append([results[f"free/joints/{name}"] for name in ("j/coordinate", "e/coordinate", "e/reaction")])
+    for one, two in zip(*found, strict=True):
+        np.testing.assert_allclose(two, one, atol=1e-6 * np.abs(one).max())
 
 
 def four_bar(across, *analyses, is_rigid=False):

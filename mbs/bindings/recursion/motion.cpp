@@ -246,8 +246,8 @@ void bind_scene(nb::module_ &m) {
           [](Scene &s, Index v, double lowest, double highest) { s.limits.push_back({v, lowest, highest}); }, "v"_a,
           "lowest"_a, "highest"_a,
           "Watch whether the coordinate with this index in v, a number, stays in a range; the run does not end there.")
-      .def_rw("has_loops", &Scene::has_loops, "Whether equations close loops: the run ends where these are singular.")
-      .def_rw("keeps_all_rows", &Scene::keeps_all_constraints, "Whether all constraint equations are independent.")
+      .def_rw("has_loops", &Scene::has_loops,
+              "Whether equations close loops, of which some may be redundant; the run ends where these are singular.")
       .def_rw("modal_amplitude_limits", &Scene::modal_amplitude_limits,
               "(bodies) kg m^2: largest p^T p of each that makes sense; empty: any.")
       .def(

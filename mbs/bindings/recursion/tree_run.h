@@ -97,7 +97,7 @@ struct TreeRun : IntegrationReport, PostureHistory { // of the scene's watch
     const Index i = output;
     double *q = states.row(i).data(), *v = q + n_q, *a = accelerations.row(i).data();
     std::copy_n(state, states.cols(), q);
-    reader.evaluate(t, q, v, a);
+    reader.evaluate(t, q, v, a), reader.renew(t, q, v, a);
     if (is_interpolated) {
       reader.project(t, q, v);
       if (!std::equal(q, q + states.cols(), state))

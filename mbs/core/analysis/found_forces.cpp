@@ -16,6 +16,7 @@ RecordedForces<Space>::RecordedForces(const Mechanism<Space> &mechanism, const S
 
 template <class Space> bool RecordedForces<Space>::find(double t) {
   const double *q = recorded_.state(t);
+  motion_.renew(t, q, q + motion_.workspace().m.n_q);
   reader_->read(q, motion_.workspace(), nullptr, values_.data());
   return !recorded_.is_at_stage();
 }

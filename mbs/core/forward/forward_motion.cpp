@@ -44,6 +44,7 @@ Scene ForwardMotion::scene_of(const ForwardModel &model) {
   check(model.q.size() == n_q && model.v.size() == n_v, "a state of the bodies' joints and modes");
   check(model.duration > 0, "a duration above 0");
   Scene scene;
+  scene.has_loops = !model.rows.empty();
   scene.targets.assign(model.rows.size(), {TimeFunction(Constant(0)), 1});
   for (const VectorXd &direction : model.inputs) {
     check(direction.size() == n_v, "inputs along v");

@@ -42,7 +42,7 @@ int main(int, char **given) {
   const Eigen::Index second = mechanism.nodes[1].q;
   state[second] = pi / 3;
   Scene scene;
-  scene.targets = {{component(1.5)}, {component(std::sqrt(3) / 2)}}, scene.keeps_all_constraints = true;
+  scene.targets = {{component(1.5)}, {component(std::sqrt(3) / 2)}};
   RecursiveMotion<Planar> motion(mechanism, scene, 0, state.data(), state.data() + mechanism.n_q);
   const auto start = std::chrono::steady_clock::now();
   double count = std::atof(given[2]);

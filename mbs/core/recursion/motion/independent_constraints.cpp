@@ -18,12 +18,8 @@ constexpr double dependent = 1e-10;
 // mechanism are rounding of the elimination, which may be more.
 constexpr double immobile = 1e-24;
 
-// A constraint that moves less than this part of the largest comes after those that it depends on: its multiplier would
-// be as much larger as theirs.
-constexpr double slight = 1e-6;
-
-// Both in natural sizes
-std::vector<int> pivots(MatrixXd S, const VectorXd &squares) {
+// Both in natural sizes. The most mobile come first: of those that depend on them, multipliers would be larger.
+std::vector<int> pivots(MatrixXd S, const VectorXd &squares, std::size_t most) {
   const VectorXd own = S.diagonal();
   const double largest = own.maxCoeff(), smallest = immobile * std::max(1., squares.maxCoeff());
   std::vector<int> left(S.rows()), kept;
@@ -31,9 +27,8 @@ std::vector<int> pivots(MatrixXd S, const VectorXd &squares) {
   const auto depends = [&](int i) {
     return !(S(i, i) > std::max(dependent * own[i], immobile * largest) && squares[i] > smallest);
   };
-  const auto rank = [&](int i) { return S(i, i) / std::max(own[i], slight * largest); };
-  while (std::erase_if(left, depends), !left.empty()) {
-    const auto best = std::max_element(left.begin(), left.end(), [&](int i, int j) { return rank(i) < rank(j); });
+  while (std::erase_if(left, depends), !left.empty() && kept.size() < most) {
+    const auto best = std::max_element(left.begin(), left.end(), [&](int i, int j) { return S(i, i) < S(j, j); });
     const int k = *best;
     kept.push_back(k), left.erase(best);
     for (const int i : left)
@@ -47,13 +42,13 @@ std::vector<int> pivots(MatrixXd S, const VectorXd &squares) {
 } // namespace
 
 template <class Space>
-std::vector<int> keep_independent_constraints(const double *q, const double *v, Workspace<Space, double> &w) {
+void keep_independent_constraints(const double *q, const double *v, Workspace<Space, double> &w, std::size_t most) {
   const Index count = w.m.constraints.size();
   std::vector<int> all(w.m.constraints.size());
   std::iota(all.begin(), all.end(), 0);
   w.keep(all);
   if (count == 0)
-    return all;
+    return;
   const NaturalSizes sizes(w.m);
   const VectorXd squares = sizes.of_gradients(gradients(q, w)).rowwise().squaredNorm();
   const std::vector<double> target(w.m.constraints.size(), 0.0);
@@ -62,11 +57,10 @@ std::vector<int> keep_independent_constraints(const double *q, const double *v, 
   accelerations(q, v, Forces<double>(), target.data(), w, a.data());
   w.keeps_delassus = false;
   const MatrixXd S = Map<const MatrixXd>(w.delassus.data(), count, count);
-  w.keep(pivots(sizes.of_rows().asDiagonal() * S * sizes.of_rows().asDiagonal(), squares));
-  return w.active;
+  w.keep(pivots(sizes.of_rows().asDiagonal() * S * sizes.of_rows().asDiagonal(), squares, most));
 }
 
-template std::vector<int> keep_independent_constraints(const double *, const double *, Workspace<Planar, double> &);
-template std::vector<int> keep_independent_constraints(const double *, const double *, Workspace<Spatial, double> &);
+template void keep_independent_constraints(const double *, const double *, Workspace<Planar, double> &, std::size_t);
+template void keep_independent_constraints(const double *, const double *, Workspace<Spatial, double> &, std::size_t);
 
 } // namespace ffrobot::recursion

@@ -5,9 +5,9 @@
 
 namespace ffrobot::recursion {
 
-// Constraints to keep, found by pivoting in C M^-1 C^T at the state (q, v): what is left of a dependent constraint's
-// diagonal after elimination is rounding. Sets workspace.active. To be called where a run starts: no step looks again.
+// Sets workspace.active to such constraints, `most` at most, found by pivoting in C M^-1 C^T at the state (q, v): what
+// is left of a dependent constraint's diagonal after elimination is rounding, and more where it does not hold.
 template <class Space>
-std::vector<int> keep_independent_constraints(const double *q, const double *v, Workspace<Space, double> &w);
+void keep_independent_constraints(const double *q, const double *v, Workspace<Space, double> &w, std::size_t most = -1);
 
 } // namespace ffrobot::recursion

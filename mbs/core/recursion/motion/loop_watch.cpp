@@ -25,8 +25,8 @@ template <class Space> double volume(const Workspace<Space, double> &w) {
 
 template <class Space>
 LoopWatch<Space>::LoopWatch(const Workspace<Space, double> &w)
-    : multiplier_(VectorXd::Zero(w.m.constraints.size())), answer_(w.m.n_v),
-      least_volume_(next_to_singular * volume(w)) {}
+    : multiplier_(VectorXd::Zero(w.m.constraints.size())), answer_(w.m.n_v), volume_(volume(w)),
+      least_volume_(next_to_singular * volume_) {}
 
 template <class Space>
 void LoopWatch<Space>::begin_at(const double *q, const Workspace<Space, double> &w, Workspace<Space, double> &other) {
@@ -46,6 +46,10 @@ template <class Space> double LoopWatch<Space>::cosine(const double *q, Workspac
     product_.col(k).noalias() = C_0_ * -answer_;
   }
   return cosine_ = determinant(product_) / (volume_ * now);
+}
+
+template <class Space> bool LoopWatch<Space>::is_poor(const Workspace<Space, double> &w) const {
+  return volume(w) < 0.3 * volume_;
 }
 
 template class LoopWatch<Planar>;

@@ -22,12 +22,13 @@ public:
   // det C M^-1 C_0^T / sqrt(det C M^-1 C^T det C_0 M_0^-1 C_0^T): free of units; 0 next to a singular posture.
   // `w` has accelerations() at q; what it has of ports and sections is something else afterwards.
   double cosine(const double *q, Workspace<Space, double> &w);
-  bool is_far() const { return cosine_ < 0.5; } // it is time to begin where the last cosine was found
+  bool is_far() const { return cosine_ < 0.5; }          // it is time to begin where the last cosine was found
+  bool is_poor(const Workspace<Space, double> &w) const; // active constraints hardly differ, beside those of the begin
 
 private:
-  MatrixXd C_0_, product_;           // (active constraints, n_v), (active constraints, active constraints)
-  VectorXd multiplier_, answer_;     // (constraints), (n_v)
-  double least_volume_, volume_ = 0; // sqrt(det C M^-1 C^T): next to singular postures; where C_0 is
+  MatrixXd C_0_, product_;       // (active constraints, n_v), (active constraints, active constraints)
+  VectorXd multiplier_, answer_; // (constraints), (n_v)
+  double volume_, least_volume_; // sqrt(det C M^-1 C^T): where C_0 is; next to singular postures
   double cosine_ = 1;
 };
 

@@ -42,18 +42,16 @@ RecursiveMotion<Space>::RecursiveMotion(const Mechanism<Space> &mechanism, const
       state_(VectorXd::Zero(mechanism.n_q + mechanism.n_v)), shifted_(VectorXd::Zero(2 * mechanism.n_v)),
       unused_(correction_) {
   go_to(t);
-  if (!scene.keeps_all_constraints)
+  if (scene.has_loops)
     keep_independent_constraints(q, v, workspace_);
-  else if (!mechanism.constraints.empty())
+  if (!mechanism.constraints.empty())
     evaluate(t, q, v, correction_.data()); // projections need its factors
   at_rest_.keep(workspace_.active);
   for (const int r : workspace_.active)
     if (const Constraint &of = mechanism.constraints[r]; forces_.acts() && of.model.kind == ConstraintKind::coordinate)
       borne_.push_back({mechanism.nodes[of.node].v + of.freedom, r, 0});
-  if (scene.has_loops && !workspace_.active.empty()) {
-    evaluate(t, q, v, correction_.data()); // with the factors of the equations that are kept
+  if (scene.has_loops && !workspace_.active.empty())
     loops_.emplace(workspace_);
-  }
   for (const GearSpring &gear : scene_.gears)
     for (const Node<Space> &node : mechanism.nodes)
       if (node.v == gear.a.v)
@@ -115,6 +113,21 @@ template <class Space> void RecursiveMotion<Space>::evaluate(double t, const dou
   evaluate_here(t, q, v, a);
 }
 
+template <class Space> void RecursiveMotion<Space>::renew(double t, const double *q, const double *v, double *a) {
+  const std::vector<int> &before = at_rest_.active;
+  if (!loops_ || before.size() == mechanism_.constraints.size() || !loops_->is_poor(workspace_))
+    return;
+  keep_independent_constraints(q, v, workspace_, before.size());
+  const bool are_others = workspace_.active != before && workspace_.active.size() == before.size();
+  if (!are_others) // or next to a singular posture
+    workspace_.keep(before);
+  at_rest_.keep(workspace_.active);
+  evaluate(t, q, v, a ? a : unused_.data());
+  if (are_others)
+    loops_.emplace(workspace_);
+  loops_->begin_at(q, workspace_, at_rest_);
+}
+
 template <class Space> void RecursiveMotion<Space>::slope(double t, const double *z, double *z_dot) {
   const double *q = local().state(z), *v = z + n_v();
   local().rate(z, z_dot);
@@ -138,7 +151,7 @@ Placed<Space, double> RecursiveMotion<Space>::residuals(double t, const double *
   for (Index r = 0; r < value_.size(); ++r) {
     const Jet law = laws_.of(r);
     value_[r] = mechanism_.constraints[r].apart(value_[r], law.value);
-    rate_[r] -= law.rate;
+    rate_[r] = workspace_.column[r] ? rate_[r] - law.rate : 0; // what is left out follows from positions
   }
   return at;
 }
@@ -228,6 +241,7 @@ double RecursiveMotion<Space>::change_size(const double *, const double *change,
 template <class Space> void RecursiveMotion<Space>::accepted(double t, const double *z, const double *z_dot) {
   if (accepted_ == 0)
     norm_.observe(workspace_, motors_at(local().state(z)));
+  renew(t, local().state(z), z + n_v());
   if (loops_ && loops_->is_far())
     loops_->begin_at(local().state(z), workspace_, at_rest_);
   norm_.take(z, z_dot, forces_.generalized(), workspace_);
@@ -273,6 +287,7 @@ template <class Space> bool RecursiveMotion<Space>::is_sensible(const double *z)
 template <class Space> void RecursiveMotion<Space>::go_on(const MotionHistory &history) {
   norm_.set_peaks(history.peaks);
   accepted_ = history.accepted;
+  workspace_.keep(history.kept), at_rest_.keep(history.kept);
   postures_ = history.postures;
 }
 

@@ -16,16 +16,17 @@ struct MotionHistory {
   NormPeaks peaks;
   unsigned long accepted = 0; // steps
   PostureHistory postures;
+  std::vector<int> kept; // constraint equations
 
-  FFROBOT_FIELDS(peaks, accepted, postures);
+  FFROBOT_FIELDS(peaks, accepted, postures, kept);
 };
 
 template <class Space> class RecursiveMotion final : public NewtonSystem<Space> {
 public:
   using OdeSystem::local, OdeSystem::n_v;
 
-  // Constraint equations that depend on others at time t and (q, v) are left out from there on; they are to be
-  // consistent. Mechanism, scene and what acts beside its forces (as in SceneForces) must outlive this.
+  // Constraint equations that depend on others at time t and (q, v) are left out; they are to be consistent. Mechanism,
+  // scene and what acts beside its forces (as in SceneForces) must outlive this.
   RecursiveMotion(const Mechanism<Space> &mechanism, const Scene &scene, double t, const double *q, const double *v,
                   const ZeroOrderHold *held = nullptr, ExternalForces *external = nullptr);
 
@@ -54,6 +55,8 @@ public:
 
   // At a state (q, v): accelerations (n_v); multipliers are in workspace().lambda
   void evaluate(double t, const double *q, const double *v, double *a);
+  // After that, or slope(): evaluates anew with others of redundant equations where those that are kept hardly differ
+  void renew(double t, const double *q, const double *v, double *a = nullptr);
   // What acts there beside gravity, elasticity and damping of modes; valid until the next call
   Forces<double> act(double t, const double *q, const double *v) { return forces_.at(t, q, v, workspace_).forces; }
   // Moves q (n_q) and v (n_v) onto the constraint equations at time t; the largest residual left, as the norm compares
@@ -64,7 +67,7 @@ public:
   void watch_posture(double t, const double *q);
   const PostureHistory &postures() const { return postures_; }
 
-  MotionHistory history() const { return {norm_.peaks(), accepted_, postures_}; }
+  MotionHistory history() const { return {norm_.peaks(), accepted_, postures_, workspace_.active}; }
   void go_on(const MotionHistory &history); // throws std::invalid_argument where it is that of another mechanism
 
   Workspace<Space, double> &workspace() { return workspace_; }

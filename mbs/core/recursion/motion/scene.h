@@ -121,9 +121,9 @@ struct Scene {
   std::vector<DrivenMarker> driven;
   std::optional<PostureWatch> watch;
   std::vector<LimitedCoordinate> limits; // of joints; told, nothing acts there
-  bool has_loops =
-      false; // closed by constraint equations: steps do not lead across postures in which all depend on each other
-  bool keeps_all_constraints = false; // who makes the scene has refused constraint equations that depend on others
+  // Constraint equations close some: those that depend on others are left out, and steps do not lead across postures in
+  // which all depend on each other. Else all are independent.
+  bool has_loops = false;
   std::vector<double>
       modal_amplitude_limits; // of each node, kg m^2: p^T p beyond it makes no sense; empty: none is too large
 };
