@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from links import ANGLES, TIP, arm, arm_links, quintic, ritz_link
-from mechanisms import checked_scene, forward, make_model, pcid, relative, revolute
+from mechanisms import forward, make_model, pcid, relative, revolute
 from oracle_runs import energy_and_losses, place_of, run
 from rods import rod
 
@@ -112,26 +112,6 @@ def test_equilibrium_winds_the_gears():
     expected = [gear_motions(about.motion)[joint].moment[0] for joint in "OA"]
     np.testing.assert_allclose(mechanism.force[along], expected, rtol=1e-9)
     assert np.abs(np.delete(mechanism.force, along)).max() < 1e-9 * mechanism.force[along].max()
-
-
-@pytest.mark.parametrize(
-    ("keys", "expected"),
-    [
-        ({"stiffness": 0.0}, "greater than 0"),
-        ({"damping": 1.0}, "only with stiffness"),
-        ({"stiffness": 1.0}, "rotor_inertia above 0"),
-        ({"stiffness": 1.0, "type": "weld"}, "in a weld"),
-        ({"rotor_inertia": -1.0}, "a number of at least 0"),
-        ({"gear_ratio": 0.0}, "greater than 0"),
-        ({"friction_speed": 0.1}, "only with coulomb_friction"),
-        ({"type": "weld", "viscous_friction": 1.0}, "in a weld joint"),
-        (GIVES | {"stiffness": {"values": [1.0, 2.0]}}, "one value more than torques"),
-        (GIVES | {"stiffness": {"values": [1.0, 2.0, 3.0], "torques": [2.0, 1.0]}}, "rising order"),
-    ],
-)
-def test_bad_keys_are_refused(keys, expected):
-    with pytest.raises(InputError, match=expected):
-        checked_scene([revolute("O", "ground", "a.root") | keys])
 
 
 def test_what_does_not_go_is_refused():
