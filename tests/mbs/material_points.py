@@ -61,7 +61,7 @@ class PointCloud:
         return replace(from_modal_body(self.name, self.modal_body()), damping=self.damping)
 
 
-def random_cloud(rng, name, n=4, points=12, dense_damping=True):
+def random_cloud(rng, name, n=4, points=12):
     """A cloud about one meter long with frequencies of a few rad/s; modal coordinates of order one are small."""
     mass = rng.uniform(0.1, 0.4, points)
     x = rng.uniform([0, -0.1, -0.1], [1, 0.1, 0.1], (points, 3))
@@ -70,13 +70,5 @@ def random_cloud(rng, name, n=4, points=12, dense_damping=True):
     gram = shapes.T @ (np.repeat(mass, 3)[:, None] * shapes)
     shapes = shapes @ np.linalg.inv(np.linalg.cholesky(gram)).T
     root = 0.3 * rng.standard_normal((n, n))
-    damping = root @ root.T if dense_damping else np.diag(rng.uniform(0, 0.5, n))
-    return PointCloud(
-        name,
-        mass,
-        x,
-        shapes.reshape(points, 3, n),
-        rng.standard_normal((len(NAMED), n)),
-        np.sort(rng.uniform(1, 60, n)),
-        damping,
-    )
+    sections, stiffness = rng.standard_normal((len(NAMED), n)), np.sort(rng.uniform(1, 60, n))
+    return PointCloud(name, mass, x, shapes.reshape(points, 3, n), sections, stiffness, root @ root.T)

@@ -1,15 +1,13 @@
 """Planar robots written in Python, of bodies of their own."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from ffrobot.mbs._core import TimeFunction
 from ffrobot.mbs.analysis.forward import Forward
 from ffrobot.mbs.analysis.pcid import Pcid
 from ffrobot.mbs.model.build import build_model
-from ffrobot.mbs.model.drives import Drive
 from ffrobot.mbs.model.model import Model
 from ffrobot.mbs.model.projection import projected
 from ffrobot.scene.load import make_scene
@@ -18,59 +16,29 @@ PLACEHOLDER = {"mass": 1.0, "inertia": 1.0, "center": (0.0, 0.0)}  # the bodies 
 
 
 @dataclass(frozen=True)
-class ModalLoad:
-    """Modal forces `vector` (n,), N/√kg, times `magnitude`(t) on one body."""
-
-    body: str
-    vector: np.ndarray
-    magnitude: TimeFunction
-
-
-@dataclass(frozen=True)
 class Robot:
     """A scene with `Body`s of its own, and its model."""
 
     scene: object
     bodies: tuple
-    modal_loads: tuple = ()
-    tables: object = None  # keys of the scene
+    tables: dict  # keys of the scene
 
     def body(self, name):
         return next(body for body in self.bodies if body.name == name)
 
     @cached_property
     def model(self) -> Model:
-        model = build_model(self.scene, self.bodies)
-        return replace(model, modal_loads=tuple(_drive(model, load) for load in self.modal_loads))
+        return build_model(self.scene, self.bodies)
 
 
-def _drive(model, load):
-    direction = np.zeros(model.tree.n_v)
-    node = model.tree.nodes[model.tree.index[load.body]]
-    direction[node.p_v] = load.vector
-    return Drive(direction, load.magnitude)
-
-
-def make_model(bodies, modal_loads=(), **keys):
+def make_model(bodies, **keys):
     """A robot of `bodies`; `keys` are those of a scene file."""
     tables = {"name": "test", "gravity": (0.0, -9.81), "analysis": [{"name": "rest", "kind": "static"}]} | keys
     tables["body"] = [
         {"name": body.name, "rigid": PLACEHOLDER | {"points": {name: (0.0, 0.0) for name in body.points}}}
         for body in bodies
     ]
-    return Robot(make_scene(**tables), tuple(map(projected, bodies)), tuple(modal_loads), tables)
-
-
-def checked_scene(joints, bodies=("a",)):
-    """The scene of rigid bodies with these joints, checked as one in a file is."""
-    rigid = PLACEHOLDER | {"points": {"root": (0.0, 0.0), "tip": (1.0, 0.0)}}
-    return make_scene(
-        name="test",
-        gravity=(0.0, -9.81),
-        body=[{"name": name, "rigid": rigid} for name in bodies],
-        joint=joints,
-        analysis=[{"name": "rest", "kind": "static"}],
-    )
+    return Robot(make_scene(**tables), tuple(map(projected, bodies)), tables)
 
 
 def pcid(name="inverse", end=1.0, output_step=0.01, **keys):

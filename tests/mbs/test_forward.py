@@ -17,10 +17,10 @@ def model():
     return arm()
 
 
-def pair(model, apply, tolerance, actuator_set=FULL, **of_forward):
+def pair(model, apply, tolerance, **of_forward):
     inverse = run(model, pcid(tolerance=tolerance))
     analysis = forward(tolerance=tolerance, actuation="inverse", apply=apply, **of_forward)
-    outcome = run(model, analysis, inverse, actuator_set)
+    outcome = run(model, analysis, inverse, FULL)
     assert outcome.status == "completed"
     return inverse, outcome
 

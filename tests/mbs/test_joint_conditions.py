@@ -8,6 +8,7 @@ from beam_links import beam_link, rectangle
 from exact_rod import torsion_constant
 from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
+from tables_3d import pin
 
 from ffrobot import make_scene, solve
 from ffrobot.mbs.linear.poses import PoseEvaluator
@@ -21,10 +22,6 @@ GEAR = 3000.0  # N·m/rad
 
 REST = {"name": "rest", "kind": "static"}
 POINTS = {"root": [0.0, 0.0], "tip": [0.8, 0.0]}
-
-
-def pin(name, first, second, **keys):
-    return {"name": name, "type": "revolute", "between": [first, second]} | keys
 
 
 def strip(length, family="in-plane-bending", count=8):

@@ -94,9 +94,6 @@ def test_least_voltage_of_the_paper(modes, patches, T, intervals, expected, with
     assert 200.0 * found.share == pytest.approx(expected, rel=within)
 
 
-ROUNDED_TO_VOLTS = (8, 4, 0.6, 64, 129.8), (6, 4, 0.6, 128, 131.6), (6, 6, 0.6, 64, 91.0), (6, 10, 0.6, 64, 55.0)
-
-
 @pytest.mark.parametrize(
     ("modes", "pairs", "T", "intervals", "expected", "within"),
     [
@@ -105,7 +102,6 @@ ROUNDED_TO_VOLTS = (8, 4, 0.6, 64, 129.8), (6, 4, 0.6, 128, 131.6), (6, 6, 0.6, 
         (4, 4, 0.6, 64, 139.7, 5e-4),
         (3, 4, 0.6, 64, 144.0, 5e-3),  # with modes and patches, rounded to volts
         (6, 2, 0.6, 64, 244.0, 5e-3),
-        *(pytest.param(*of_one, 0.5 / of_one[-1], marks=pytest.mark.nightly) for of_one in ROUNDED_TO_VOLTS),
     ],
 )  # fmt: skip
 def test_least_voltage(modes, pairs, T, intervals, expected, within):
@@ -148,9 +144,6 @@ def breaks_of_the_notes(T):
         (6, 0.6, 3e-4, 63.6748),
         (3, 0.6, 2e-4, 91.4569),
         (6, 0.6, 1e-3, 0.0),  # section 4: motors alone
-        pytest.param(6, 1.0, 1e-5, 17.863, marks=pytest.mark.nightly),
-        pytest.param(6, 0.5, 3e-4, 191.810, marks=pytest.mark.nightly),
-        pytest.param(4, 0.6, 3e-4, 67.561, marks=pytest.mark.nightly),
     ],
 )
 def test_least_voltage_within_a_path_tolerance(modes, T, error, expected):

@@ -2,10 +2,9 @@
 
 import numpy as np
 from material_points import random_cloud
-from mechanisms import ModalLoad, make_model, revolute
+from mechanisms import make_model, revolute
 from random_mechanisms import stiffened as with_stiffening
 
-from ffrobot.mbs.fields.expressions import parse_expression
 from ffrobot.mbs.model.masses import with_payload
 
 LOADS = (
@@ -14,8 +13,8 @@ LOADS = (
 )
 
 
-def clouds(rng, count, **keys):
-    return [random_cloud(rng, f"b{k}", **keys).body() for k in range(1, count + 1)]
+def clouds(rng, count):
+    return [random_cloud(rng, f"b{k}").body() for k in range(1, count + 1)]
 
 
 def serial_joints(count):
@@ -101,12 +100,11 @@ def tree(rng, **keys):
 
 
 def loaded(rng, **keys):
-    """Forces and moments on a point, a joint moment, modal loads as patches make them, and a payload."""
+    """Forces and moments on a point, a joint moment, and a payload."""
     bodies = clouds(rng, 2)
     bodies[1] = with_payload(bodies[1], "tip", 0.6, np.zeros(3), np.diag([0.0, 0.0, 0.02]))
-    patches = [ModalLoad("b1", rng.standard_normal(bodies[0].n_modes), parse_expression(f"2-{k}*t")) for k in range(2)]
     tables = serial(2) | {"load": LOADS, "initial": {"angles": {"b1": 1.2, "b2": -0.7}}}
-    return make_model(bodies, patches, **(tables | keys))
+    return make_model(bodies, **(tables | keys))
 
 
 def stiffened(rng, **keys):

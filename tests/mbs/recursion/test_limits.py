@@ -23,10 +23,10 @@ PACE = np.sqrt(2.0 * G * 0.3 / (0.05 + 2.0 * 0.09))  # 1/s, of small swings abou
 START = 1.2  # rad
 
 
-def system_of(joints, bodies, joints_at=None, rates=None, turn=None):
+def system_of(joints, bodies, joints_at, rates=None):
     scene = ffrobot.make_scene(
         name="swing", space="spatial", gravity=[0.0, 0.0, -G], body=[{"name": name, "rigid": ROD} for name in bodies],
-        joint=joints, initial={"joints": joints_at or {}, "joint_rates": rates or {}},
+        joint=joints, initial={"joints": joints_at, "joint_rates": rates or {}},
         analysis=[{"name": "free", "kind": "forward", "end": 1.0, "output_step": 0.1}],
     )  # fmt: skip
     model = build_model(scene, [body.spatial for body in load_bodies(scene, lambda _: None).values()])

@@ -66,13 +66,13 @@ def check(model, q, scene, stiffness, damping, rows, seed=1):
         agree(found, M + E, C, force, c)
 
 
-def check_mechanism(mechanism, rng, with_springs=True):
+def check_mechanism(mechanism, rng):
     model = mechanism.model()
     q, _ = random_state(rng, mechanism, model)
     stiffness, damping, springs = np.zeros(model.n_v), np.zeros(model.n_v), []
     for body, (joint_q, p_q, joint_v, p_v) in zip(mechanism.bodies, model.first, strict=True):
         stiffness[p_v : p_v + body.n], damping[p_v : p_v + body.n] = body.stiffness, np.diag(body.damping)
-        if with_springs and p_q - joint_q == p_v - joint_v:
+        if p_q - joint_q == p_v - joint_v:
             springs += [(joint_q + k, joint_v + k, *rng.uniform(1, 9, 2)) for k in range(p_v - joint_v)]
     for _, v, k, d in springs:
         stiffness[v], damping[v] = k, d
