@@ -183,18 +183,6 @@ def rotor_mass(node) -> float:
     return inertia * ratio**2 if node.joint.type == "prismatic" else 0.0
 
 
-def rotor_moments(state: Accelerated, node) -> Array:
-    """J (u̇ z + u Ω × z) (T, 3), N·m: the rate of angular momentum of the rotor in the joint that carries a body."""
-    mechanism, moments = mechanism_of(state.tree, np.zeros(3)), np.zeros((len(state.q), 3))
-    accelerations = absolute_accelerations(mechanism, state)
-    for row, inertia in spinning_rotor(state.tree, node):
-        for k, at in enumerate(absolute_states(mechanism, state)):
-            of_row, first = (f(x, at.q, at.v) for f, x in ((mechanism.row, row), (mechanism.marker, row.a)))
-            z, rate = first.F[:, 2], of_row.gradient @ accelerations[k] + of_row.bias
-            moments[k] += inertia * (rate * z + of_row.rate * np.cross(first.velocity[3:], z))
-    return moments
-
-
 def gear_energy(tree, q: Array, v: Array) -> tuple[Array, Array]:
     """½ k δ² (T,) J of all compliant gears, and c δ̇² (T,) W that they dissipate."""
     strain, dissipated = np.zeros((2, len(q)))
