@@ -18,7 +18,6 @@ from record import options
 import ffrobot
 
 sys.path += [str(Path(__file__).parents[1] / folder) for folder in ("", "cases", "mbs")]
-from internal_inertia import Chain, changes
 from test_tracked_robots import ORIGIN, geared, in_3d, patches, revolute, scene, septic, strip
 
 
@@ -56,24 +55,6 @@ def random_arm(rng, tolerance):
         tables["analysis"][0]["path_tolerance"] = tolerance
         return f"{what}, payload {payload:.2f} kg", tables
     return f"{what}, {f:.0f} Hz, payload {payload:.2f} kg", geared(tables, f, **inertias)
-
-
-def own_changes(tables):
-    """Times (s) at which a zero of an arm in the plane passes through infinity."""
-    links = [body["link"] for body in tables["body"]]
-    shapes = [(of["geometry"]["length"], of["geometry"]["section"]) for of in links]
-    sections = [(length, of["height"], of["width"]) for length, of in shapes]
-    (path,), angles = tables["trajectory"], list(tables["initial"]["angles"].values())
-    texts = [path[axis] for axis in "xy" if axis in path]
-    mass = sum(load["mass"] for load in tables.get("payload", ()))
-    count, end = links[0]["modes"]["count"], tables["analysis"][0]["end"]
-
-    def output(t):
-        return np.array([eval(text, {"t": min(max(t, 0.0), end)}) for text in texts])
-
-    last = tables["joint"][-1]
-    rotor = (last["rotor_inertia"], last["gear_ratio"]) if "rotor_inertia" in last and len(sections) == 2 else None
-    return changes(Chain(sections, count, mass, output, rotor=rotor), np.diff(angles, prepend=0.0), end)
 
 
 def main():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from patch_sets import amplifiers
 from test_tracking import strip_scene
-from tracked_arms import own_changes, random_arm
+from tracked_arms import random_arm
 
 import ffrobot
 from ffrobot.mbs.inversion.motors_only import outcome_along
@@ -194,13 +194,12 @@ def test_finer_intervals_that_have_no_solution():
 
 @pytest.mark.parametrize(("tolerance", "expected"), [(0.0, [0.184, 0.878]), (1e-4, [])])
 def test_zeros_that_a_rotor_takes_to_infinity(tolerance, expected):
-    """det M_i of two links changes its sign by the rotor on the first one alone, as by modes in closed form."""
+    """det M_i of two links changes its sign by the rotor on the first one alone; times by masses along exact modes."""
     _, tables = random_arm(np.random.default_rng([62, 7]), tolerance)
     solution = prepare_scene(ffrobot.make_scene(**tables), Watcher())
     end = solution.scene.analysis[0].end
     servo = with_gears(make_servo(solution.model, end, lambda: True))
     linear = linearise(servo, end)
-    np.testing.assert_allclose(own_changes(tables), expected, atol=1e-3)
     np.testing.assert_allclose(linear.times[list(linear.singular_after)], expected, atol=linear.times[1])
     assert ["Reduce rotor_inertia of to_fore, or" in text for text in singular_times(servo, linear)] == [True][
         : len(expected)
