@@ -125,7 +125,7 @@ def test_a_closed_loop_acts_on_pieces_and_knows_the_links():
         "sensor": [{"pzt": "link2"}, {"point": "link2.tip"}, {"modal": "link1"}],
         "controller": [
             {"kind": "joint-pid", "proportional": {"O": 5.0, "A": 1.0}, "derivative": {"O": 0.05, "A": 0.01}},
-            {"kind": "modal-velocity", "bodies": ["link2"], "modes": 1, "damping_ratio": 0.01, "sensor": "ideal"},
+            {"kind": "modal-velocity", "bodies": ["link2"], "modes": 1, "damping_ratio": 0.01},
         ],
     }  # fmt: skip
     lqr = {"kind": "lqr", "modes": 2, "moment": 0.1, "voltage": 10.0, "angle": 0.2, "rate": 2.0, "deflection": 0.05}

@@ -58,7 +58,9 @@ class LoopTask:
         signals = partial(make_signals, plant, context, whole=context.whole)
         read, estimated = tuple(signals(analysis.sensor)), tuple[Signal, ...]()
         if analysis.observer is None:
-            read = merged(read, signals(needed_sensors(robot, analysis.controller)))
+            needed = signals(needed_sensors(robot, analysis.controller))
+            balanced = {signal.name for signal in needed if signal.sensor.pzt is not None}
+            read = tuple(replace(of, by_volts=0.0) if of.name in balanced else of for of in merged(read, needed))
         else:
             tip = analysis.tip or default_tip(robot.model)
             estimated = merged(signals(estimated_sensors(robot, analysis.controller, tip)), ())

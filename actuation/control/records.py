@@ -298,7 +298,7 @@ class ModalVelocity(ControllerRecord):
     damping_ratio: Positive
     """Damping ratio ζ that is added to each of these modes."""
     sensor: Literal["pzt", "ideal"] = "pzt"
-    """Measured signals: voltages of the same patches, or modal coordinates and velocities directly."""
+    """Measured signals: voltages of the same patches by strain of modes, or modal coordinates and rates directly."""
 
     refers_to = (("bodies", "body"), ("bodies", "patched body"))
 

@@ -36,7 +36,8 @@ def decay(solution, name):
 
 
 def test_patches_add_the_damping_that_is_asked_for():
-    loops = loop(sample_time=1e-4, controller=[DAMPER | {"sensor": "ideal"}]), loop("free", sample_time=1e-4)
+    """By their own voltages."""
+    loops = loop(sample_time=1e-4, controller=[DAMPER]), loop("free", sample_time=1e-4)
     solution = solve_scene(held_link(paper_link(count=3), *loops, end=0.2))
     assert abs(decay(solution, "free")) < 1e-4
     assert decay(solution, "loop") == pytest.approx(0.05, rel=0.05)
