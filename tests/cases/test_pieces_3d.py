@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from beam_links import beam_link
-from scipy.integrate import solve_bvp
+from exact_rod import rigidities, tip_of
 from tables_3d import joint, revolute, rigid, scene
 
 import ffrobot
 from ffrobot.common.errors import InputError
-from ffrobot.common.rotations import of_quaternion, of_rpy
+from ffrobot.common.rotations import exponential, of_quaternion, of_rpy
 
 BENT_AND_TWISTED = ["in-plane-bending", "out-of-plane-bending", "torsion"]
 RPY = (0.3, -0.4, 0.7)
@@ -37,18 +37,10 @@ def acting(vector, components="xyz"):
     return [{"point": "beam.tip"} | dict(zip(components, map(repr, vector.tolist()), strict=True))]
 
 
-def elastica(k):
-    """Tip (2,) m and slope of an inextensible cantilever under a force k EI/L² across, L = 1: θ″ = −k cos θ."""
-
-    def slopes(_s, y):
-        return [y[1], -k * np.cos(y[0]), np.cos(y[0]), np.sin(y[0])]
-
-    def ends(a, b):
-        return [a[0], b[1], a[2], a[3]]
-
-    s = np.linspace(0.0, 1.0, 101)
-    found = solve_bvp(slopes, ends, s, np.array([s, 1 - s, s, 0 * s]), tol=1e-10, max_nodes=100_000)
-    return found.y[2:, -1], found.y[0, -1]
+def bent(force):
+    """Place (3,) of the tip and its tangent (3,) of the elastica under a force (3,), in axes of the root."""
+    moved, turned = tip_of(rigidities(SIDE, SIDE, SOFT, 0.3), 1.0, force, np.zeros(3))
+    return np.array([1.0, 0.0, 0.0]) + moved, exponential(turned)[:, 0]
 
 
 @pytest.mark.parametrize("pieces", [4, 5], ids=["at a cut", "within a piece"])
@@ -58,7 +50,8 @@ def test_stresses_are_those_of_the_bent_link(pieces):
     The one link, whose loads act on it undeformed, is 19 % off at the root.
     """
     A, k, (y, z) = of_rpy(*RPY), 2.0, (SIDE / 2, SIDE / 3)
-    force = A @ [0.0, 0.6 * k * EI, 0.8 * k * EI]
+    across = np.array([0.0, 0.6 * k * EI, 0.8 * k * EI])
+    force = A @ across
     points = {"root": [0.0, y, z], "middle": [0.5, y, z]}
     with solved(link(stress={"points": points}), pieces, load=acting(force)) as results:
         found = {name: results[f"rest/stress/beam/points/{name}/stress"][0] for name in points}
@@ -67,7 +60,7 @@ def test_stresses_are_those_of_the_bent_link(pieces):
         assert results.attributes("rest/stress/beam")["method"] == "mode acceleration"
     N, M = axes[:, 0] @ force, axes.T @ np.cross(arm, force)
     middle = N / SIDE**2 + 12 * (M[1] * z - M[2] * y) / SIDE**4
-    root = -k * SOFT * elastica(k)[0][0] * (0.6 * y + 0.8 * z)
+    root = -k * SOFT * bent(across)[0][0] * (0.6 * y + 0.8 * z)
     np.testing.assert_allclose([found["root"][0], found["middle"][0]], [root, middle], rtol=2e-3)
 
 
@@ -83,10 +76,8 @@ def test_elastica_in_an_oblique_plane(condition, stiffened, order, least):
     To fourth order of the pieces, whose bending shortens them; to second where the scene says that it does not.
     """
     A, angle, k = of_rpy(*RPY), 0.8, 2.0
-    (x, w), theta = elastica(k)
     across = np.array([0.0, np.cos(angle), np.sin(angle)])
-    exact = A @ (x * np.array([1.0, 0.0, 0.0]) + w * across)
-    tangent = A @ (np.cos(theta) * np.array([1.0, 0.0, 0.0]) + np.sin(theta) * across)
+    exact, tangent = (A @ of for of in bent(k * EI * across))
     off, turned = [], []
     for pieces in (2, 4, 8):
         keys = {"load": acting(A @ across * k * EI), "geometric_stiffening": stiffened}
@@ -200,8 +191,7 @@ def test_rates_of_the_one_link_are_derivatives(condition):
 
 def test_auto_takes_as_many_as_the_deflection_needs():
     """More for a soft link than for a stiff one, none for one that hardly bends: tips to 1e-3 of the length."""
-    (x, w), _ = elastica(2.0)
-    exact = of_rpy(*RPY) @ [x, w, 0.0]
+    exact = of_rpy(*RPY) @ bent([0.0, 2.0 * EI, 0.0])[0]
     load = acting(of_rpy(*RPY)[:, 1] * 2.0 * EI)
     with solved(link(), "auto", load=load) as results:
         assert 10 <= results.attributes("rest/bodies/beam")["pieces"] <= 20
