@@ -4,6 +4,7 @@ import runpy
 
 import numpy as np
 import pytest
+from four_bar import closed, planar
 from loop_scenes import PID, blow, loop, two_rods, wheel
 
 from ffrobot.actuation.control.robot import RigidArm
@@ -30,29 +31,15 @@ def test_rigid_arm_knows_the_moments_of_the_inverse_analysis():
 
 
 def test_the_rigid_arm_says_where_its_links_do_not_reach():
-    """A slider driven at 0.35 m from the crank's axis; crank and rod are 0.4 m long in all."""
-
-    def bar(length):
-        return {"mass": 1.0, "inertia": 0.01, "center": [0.0, 0.0], "points": {"a": [0.0, 0.0], "b": [length, 0.0]}}
-
-    def joint(name, kind, *between, **keys):
-        return {"name": name, "type": kind, "between": between} | keys
-
-    scene = make_scene(
-        name="slider", gravity=[0.0, 0.0],
-        body=[{"name": name, "rigid": bar(length)} for name, length in (("c", 0.1), ("r", 0.3), ("s", 0.1))],
-        joint=[joint("O", "revolute", "ground", "c.a"), joint("A", "revolute", "c.b", "r.a"),
-               joint("B", "revolute", "r.b", "s.a"),
-               joint("S", "prismatic", "ground", "s.a", axis=[1.0, 0.0], motor=True)],
-        initial={"angles": {"c": 1.0, "r": -0.3, "s": 0.0}}, trajectory=[{"name": "t", "joint": "S", "value": "0.35"}],
-        analysis=[{"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.1}],
-    )  # fmt: skip
-    solution = solve_scene(scene)
+    """A four-bar driven at its rocker, which crank and coupler hold between two angles."""
+    path = {"name": "t", "joint": "D", "value": str(closed(1.0)["D"])}
+    inverse = {"name": "inverse", "kind": "pcid", "end": 0.1, "output_step": 0.1}
+    joints = {name: {"motor": name == "D"} for name in "ABCD"}
+    solution = solve_scene(make_scene(**planar(joints, [inverse], trajectory=[path])))
     arm = RigidArm(solution.model.without_paths(), solution.outcomes["inverse"].q[0])
-    q, crank = arm.place(np.array([0.36]))[0], (0.36**2 + 0.1**2 - 0.3**2) / (2 * 0.36 * 0.1)  # law of cosines
-    assert np.abs(np.cos(q) - crank).min() < 1e-9
+    assert np.abs(np.cos(arm.place(np.array([closed(1.1)["D"]]))[0]) - np.cos(1.1)).min() < 1e-9
     with pytest.raises(SolveError, match="expected joint angles that the rigid links can have, found"):
-        arm.place(np.array([0.45]))
+        arm.place(np.array([0.3]))
 
 
 def test_a_function_of_the_user_acts_like_the_same_controller_of_the_scene(tmp_path):

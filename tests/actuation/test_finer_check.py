@@ -59,3 +59,9 @@ def test_the_check_of_a_rigid_robot_is_its_replay():
     check = solve_scene(scene).analyses["inverse"].check
     assert (check.point, check.status) == ("rod.tip", "completed")
     assert check.error < 1e-6
+
+
+@pytest.mark.parametrize("change", [{"motor": False}, {"stiffness": 1e4, "damping": 1.0, "rotor_inertia": 1e-4}])
+def test_what_a_replay_cannot_do(change):
+    with pytest.raises(library.InputError, match="check: expected motors, and joints without stiffness"):
+        library.solve(turned(joint=change, pzt=[]))

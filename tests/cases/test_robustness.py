@@ -1,11 +1,10 @@
-"""What is left of computed motions where the robot is not its model: scaled links, lanes, more modes, bad input."""
+"""What is left of computed motions where the robot is not its model: scaled links, lanes, bad input."""
 
 import re
 
 import numpy as np
 import pytest
 from beam_links import beam_link, modal_body, rectangle
-from planar_features import link, one_link
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
@@ -160,29 +159,3 @@ def test_deviations_that_are_none(keys, text):
     tables["analysis"][0]["robustness"] = keys
     with pytest.raises(InputError, match=re.escape(text)):
         ffrobot.make_scene(**tables)
-
-
-CHECKED = {"kind": "pcid", "check": "finer"}
-
-
-def checked(modes, **of_joint):
-    """Of one link in 3D that turns about its root, with as many patches as modes unless its joint is changed."""
-    body = {"link": link(modes={"count": modes, "family": "in-plane-bending", "attachment_modes": False})}
-    _, tables = one_link(CHECKED, body, count=0 if of_joint else modes)
-    tables["joint"] = [tables["joint"][0] | of_joint]
-    return ffrobot.solve(ffrobot.make_scene(**tables))
-
-
-def test_error_is_that_of_the_modes_left_out():
-    """It falls with every mode."""
-    errors = []
-    for modes in (1, 3):
-        with checked(modes) as results:
-            errors.append(results.attributes("inverse")["check_error"])
-    assert errors[0] > 4 * errors[1]
-
-
-@pytest.mark.parametrize("change", [{"motor": False}, {"stiffness": 1e4, "damping": 1.0, "rotor_inertia": 1e-4}])
-def test_what_a_replay_cannot_do(change):
-    with pytest.raises(InputError, match="check: expected motors, and joints without stiffness"):
-        checked(2, **change)

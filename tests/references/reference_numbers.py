@@ -45,7 +45,6 @@ rates (V/s) as of such a voltage within a millisecond."""
 SENSITIVE = {
     "arm_under_control": ("patches",),
     "compliant_arm": ("firm_joint",),
-    "redundant_by_torque": ("inverse",),  # the least integral, found to a tolerance
     "two_link": ("joints_only",),
     "two_link_fcid": ("straight_forward",),
     "two_link_motors_only": ("joints_only", "redefined"),

@@ -9,7 +9,7 @@ from beam_links import beam_link, rectangle
 from moved_scenes import tables_of
 from random_robots import random_scene
 from robots_3d import random_scene_in_3d
-from tables_3d import joint, pin, planar, scene
+from tables_3d import pin, planar
 
 import ffrobot
 
@@ -66,20 +66,6 @@ def slider_crank(of_joints):
     return ffrobot.make_scene(**tables, load=[{"joint": j, "moment": f"{m}*sin(30*t)"} for j, m in moments.items()])
 
 
-def slide(**tables):
-    """A cart, a rod welded to it, a flexible link behind it; a way, an angle and the frame of the link on paths."""
-    points = {"root": [0.0, 0.0], "tip": [0.3, 0.1]}
-    cart = {"mass": 2.0, "inertia": 0.02, "center": [0.1, 0.05], "points": points}
-    bodies = [{"name": "cart", "rigid": cart}, {"name": "rod", "rigid": cart | {"mass": 0.5}}]
-    joints = [
-        joint("way", "prismatic", "ground", "cart.root", at=[0.1, 0.0], axis=[2.0, 1.0]),
-        joint("weld", "weld", "cart.tip", "rod.root"),
-        pin("turn", "arm.root", "rod.tip"),
-    ]
-    bodies, start = [*bodies, {"name": "arm", "link": bending()}], {"state": "undeformed", "angles": {"arm": 0.5}}
-    return ffrobot.make_scene(**planar(bodies, joints, INVERSE, AGAIN, initial=start, **tables))
-
-
 def spring(t, position, velocity):
     return -40.0 * (position - np.array([0.8, 0.2])) - 0.8 * velocity
 
@@ -120,46 +106,9 @@ PLANAR = {
     ),
     "arm_checked": partial(arm, INVERSE | {"check": "finer"}),
     "arm_on_a_spring": partial(arm, RELEASED, load=[{"point": "link2.tip", "force": spring}], **LET_GO),
-    "slide": partial(slide, trajectory=[{"name": "way", "joint": "way", "value": "0.1 + t**2"},
-                                        {"name": "turn", "joint": "turn", "value": "-0.5 + 3*t**2"}]),
-    "slide_by_angles": partial(slide, trajectory=[{"name": "turn", "angle": "arm.tip", "value": "0.5 + 3*t**2"},
-                                                  {"name": "way", "joint": "way", "value": "0.1 + t**2"}]),
     "loop_with_friction": partial(slider_crank, dict.fromkeys(("O", "A", "B", "guide"), FRICTION)),
-    "loop_as_built": partial(slider_crank, {"O": FRICTION, "A": BUILT, "B": FRICTION, "guide": BUILT}),
-    "loop_with_rotors": partial(slider_crank, dict.fromkeys(("O", "A", "B", "guide"), BUILT)),
     **{f"random_{k}": lambda k=k: random_scene(3717, k)[1] for k in (*range(4), *range(6, 12))},
 }  # fmt: skip
-
-
-FREE = {"mass": 1.2, "center": [0.15, 0.02, -0.01], "inertia": [4e-3, 9e-3, 8e-3],
-        "points": {"root": [0.0, 0.0, 0.0], "tip": [0.3, 0.05, -0.04]}}  # fmt: skip
-
-
-def in_3d(name, bodies, joints, *analyses, **tables):
-    return ffrobot.make_scene(**scene(bodies, joints, *analyses, name=name, gravity=[0.3, -0.5, -9.8], **tables))
-
-
-def joints_of_all_types():
-    """Rigid bodies behind a flexible one, each joined in another way, let go under loads."""
-    types = {
-        "revolute": {"axis": [0.1, 0.9, 0.2]}, "prismatic": {"axis": [1.0, 0.3, 0.2]},
-        "cylindrical": {"axis": [0.2, 1.0, 0.1]}, "screw": {"axis": [0.0, 0.6, 0.8], "lead": 0.05},
-        "universal": {"axis": [0.0, 1.0, 0.0], "second_axis": [0.0, 0.0, 1.0]}, "spherical": {},
-        "planar": {"axis": [0.1, 0.2, 1.0]}, "weld": {"rpy": [0.1, 0.4, -0.2]},
-    }  # fmt: skip
-    bodies = [{"name": "base", "link": LINK | {"modes": {"count": 6, "family": "all"}}}]
-    joints = [pin("foot", "ground", "base.root", axis=[0.0, 0.6, 0.8], at=[0.1, 0.0, 0.2])]
-    for name, own in types.items():
-        bodies.append({"name": name, "rigid": FREE})
-        joints.append(joint(f"to_{name}", name, "base.tip", f"{name}.root", **own))
-    bodies.append({"name": "free", "rigid": FREE})
-    moments = [
-        {"joint": f"to_{name}", "moment": f"0.05*cos({9 + k}*t)"} for k, name in enumerate(("revolute", "screw"))
-    ]
-    return in_3d(
-        "joints", bodies, [one | ({} if one["type"] == "weld" else {"motor": False}) for one in joints], RELEASED,
-        load=[*moments, {"point": "spherical.tip", "x": "2*t", "mz": "0.1"}, {"point": "free.tip", "y": "t"}],
-    )  # fmt: skip
 
 
 def arm_in_3d(*analyses, checkpoint="arm3_line_static", of_joints=(), of_bodies=(), **tables):
@@ -178,27 +127,6 @@ def planar_case_in_3d(case, *analyses, **tables):
     return ffrobot.make_scene(**found | {"initial": {"joints": joints}, "analysis": list(analyses)} | tables)
 
 
-def in_pieces():
-    """A pendulum on a universal joint, of a link in two pieces."""
-    of_link = LINK | {"modes": {"count": 6, "family": "all"}, "damping": {"rayleigh": [0.0, 1e-5]}}
-    foot = joint(
-        "O", "universal", "ground", "link.root", axis=[0.0, 1.0, 0.0], second_axis=[0.0, 0.0, 1.0], motor=False
-    )
-    return in_3d("pieces", [{"name": "link", "link": of_link, "pieces": 2}], [foot], RELEASED)
-
-
-def seven_joints(redundancy):
-    """A rigid arm with a joint more than its path asks for."""
-    axes = [[0, 0, 1], [0, 1, 0], [1, 0, 0], [0, 1, 0]]
-    bodies = [{"name": f"l{k}", "rigid": FREE} for k in range(4)]
-    ends = ["ground", *(f"l{k}.tip" for k in range(3))]
-    joints = [pin(f"q{k}", ends[k], f"l{k}.root", axis=axis) for k, axis in enumerate(axes)]
-    guess = {"q0": 0.2, "q1": -0.6, "q2": 0.3, "q3": 1.1}
-    path = {"name": "tip", "point": "l3.tip", "x": "0.75 + 0.5*t**2", "y": "0.35 - 0.4*t**2", "z": "0.0 + t**2"}
-    keys = {"trajectory": [path], "initial": {"joints": guess}, "redundancy": redundancy}
-    return in_3d("redundant", bodies, joints, INVERSE | {"end": 0.2, "output_step": 0.01}, **keys)
-
-
 SPATIAL = {
     "arm_in_3d": partial(arm_in_3d, INVERSE, AGAIN, STATIC, SAGGING, LINEAR),
     "arm_in_3d_as_built": partial(
@@ -209,13 +137,9 @@ SPATIAL = {
     "arm_in_3d_with_gears": partial(arm_in_3d, INVERSE, AGAIN | {"apply": "joints"}, of_joints=GIVES),
     "arm_in_3d_with_frame_motors": partial(arm_in_3d, INVERSE, SAGGING, motors="frame"),
     "arm_in_3d_stiffened": partial(arm_in_3d, INVERSE, AGAIN, SAGGING, geometric_stiffening=True),
-    "pieces_in_3d": in_pieces,
     "tool_axis": partial(arm_in_3d, INVERSE, AGAIN, checkpoint="arm5_tool_axis"),
     "pose": partial(arm_in_3d, INVERSE, SAGGING, checkpoint="arm6_static"),
     "stanford": partial(arm_in_3d, INVERSE, AGAIN | {"apply": "joints"}, STATIC, checkpoint="stanford"),
-    "joints_of_all_types": joints_of_all_types,
-    "redundant_by_torque": partial(seven_joints, "least-torque"),
-    "redundant_by_motion": partial(seven_joints, "least-motion"),
     "patches_in_3d": partial(
         planar_case_in_3d, "two_link_patched", INVERSE, AGAIN | {"apply": "joints+pzt"}, SAGGING
     ),
