@@ -108,43 +108,7 @@ class Mutator:
             inner[key] = self.value(self.chance.choice(["text", 1.0]))
             return f"{where}: {key[:40]!r} = {str(inner[key])[:60]!r} added beside it"
         inner[last] = self.value(inner[last])
-        if isinstance(last, str) and last in ("name", "body", "point") and isinstance(inner[last], str) and how > 0.7:
-            return self.renamed(data, place, where)
         return f"{where} = {str(inner[last])[:80]!r}"
-
-    def renamed(self, data: dict[str, Any], place: tuple[int | str, ...], where: str) -> str:
-        """A body, joint or analysis with another name wherever it is used, so that the name gets far."""
-        table, entry, _ = place if len(place) == 3 else ("", 0, "")
-        name = self.chance.choice([name for name in NAMES if len(name) < 50])
-        old = self.original.get(str(table), {}).get(entry) if table else None
-        if isinstance(old, str):
-
-            def replaced(value: Any) -> Any:
-                if isinstance(value, dict):
-                    return {name if k == old else k: replaced(v) for k, v in value.items()}
-                if isinstance(value, list):
-                    return [replaced(v) for v in value]
-                if isinstance(value, str):
-                    return (
-                        name
-                        if value == old
-                        else f"{name}.{value.partition('.')[2]}"
-                        if value.startswith(f"{old}.")
-                        else value
-                    )
-                return value
-
-            changed = replaced(copy.deepcopy(self.whole))
-            data.clear()
-            data.update(changed)
-        return f"{where}: {old!r} renamed to {name!r}"
-
-    def remember(self, data: dict[str, Any]) -> None:
-        self.whole = data
-        self.original = {
-            key: {k: entry.get("name") for k, entry in enumerate(value) if isinstance(entry, dict)}
-            for key, value in data.items() if isinstance(value, list)
-        }  # fmt: skip
 
     def damage(self, text: str) -> tuple[bytes, str]:
         """The text of a file, damaged."""

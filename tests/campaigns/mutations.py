@@ -9,7 +9,6 @@ and memory, and after `solve` the commands that read its results. Exit code 1 wh
 traceback, a crash, no end within five minutes, a message that names no file, other words on stderr.
 """
 
-import copy
 import json
 import os
 import random
@@ -130,7 +129,6 @@ class Campaign:
             content, how = self.mutator.damage(text)
         else:
             data = tomllib.loads(text)
-            self.mutator.remember(copy.deepcopy(data))
             how = self.mutator.mutate(data, place)
             try:
                 content = tomli_w.dumps(data).encode()
@@ -146,16 +144,16 @@ class Campaign:
         (folder / "scene.results.h5").unlink()
         kind = self.command(["solve", "scene.toml"], folder, label, names)
         if (folder / "scene.results.h5").exists() and (kind == "solved" or self.chance.random() < 0.1):
-            self.read(folder, label, often="renamed" in how)
+            self.read(folder, label)
 
-    def read(self, folder: Path, label: str, often: bool) -> None:
-        """The commands that read results: each now and then, all for names."""
+    def read(self, folder: Path, label: str) -> None:
+        """The commands that read results: each now and then."""
         results = "scene.results.h5"
         commands = [["info", results], ["feasibility", results], ["linear", results], ["report", results],
                     ["plot", results, "--format", "png"],
                     ["view", results, "--frames", "3", "--no-pictures"]]  # fmt: skip
         for command in commands:
-            if often or self.chance.random() < 0.1:
+            if self.chance.random() < 0.1:
                 self.command(command, folder, label, [results, "figures.toml"])
 
     def command(self, arguments: list[str], folder: Path, label: str, files: list[str]) -> str:
