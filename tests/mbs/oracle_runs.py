@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from mechanisms import always
 from moving_trees import state_of
-from scipy.integrate import simpson
 from tree_oracle import row_values, target_rates
 
 from ffrobot.mbs import _core
@@ -22,10 +21,9 @@ from ffrobot.mbs.scene.analysis import IntegratedAnalysis
 
 
 class JointForces(NamedTuple):
-    """On the second side: force (T, 2), moment (T,), and what the motor does (T,), None without one."""
+    """On the second side: force (T, 2), and what the motor does (T,), None without one."""
 
     reaction: np.ndarray
-    reaction_moment: np.ndarray
     motor: np.ndarray | None
 
 
@@ -123,19 +121,13 @@ def place_of(seen, point):
 def joint_forces(seen, joint):
     wrench = reactions(seen.motion)[joint]
     moments = motor_moments(seen.motion)
-    return JointForces(wrench[0][:, :2], wrench[1][:, 2], moments[joint][:, 0] if joint in moments else None)
+    return JointForces(wrench[0][:, :2], moments[joint][:, 0] if joint in moments else None)
 
 
-def energies(seen):
-    """Kinetic, strain and gravitational energy, dissipated power (T,)."""
-    return vars(totals(seen.motion)[0])
-
-
-def energy_and_losses(seen):
-    """Total energy (T,) and what damping has taken by the end."""
-    parts = energies(seen)
-    total = parts["kinetic"] + parts["strain"] + parts["gravitational"]
-    return total, simpson(parts["dissipated_power"], x=seen.time)
+def total_energy(seen):
+    """(T,), and its kinetic part."""
+    parts = totals(seen.motion)[0]
+    return parts.kinetic + parts.strain + parts.gravitational, parts.kinetic
 
 
 def evaluated(robot, t, q, v):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from links import ANGLES, TIP, arm, arm_links, quintic, ritz_link
 from mechanisms import forward, make_model, pcid, relative, revolute
-from oracle_runs import energy_and_losses, place_of, run
+from oracle_runs import place_of, run, total_energy
 from rods import rod
 
 from ffrobot.common.errors import InputError
@@ -162,7 +162,7 @@ def test_a_gear_that_stiffens_swings_as_two_sinusoids():
     beyond = np.abs(twist) > KNEE / K1
     np.testing.assert_allclose(gear, np.where(beyond, KNEE + K2 * (twist - KNEE / K1), K1 * twist), atol=1e-12)
     work = tau * motor_motion(outcome.motion, "O")[0]
-    energies, _ = energy_and_losses(outcome)
+    energies, _ = total_energy(outcome)
     np.testing.assert_allclose(energies - energies[0], work - work[0], atol=1e-7 * np.abs(work).max())
 
 

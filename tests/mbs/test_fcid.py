@@ -28,16 +28,11 @@ def given_shapes(model):
     }
 
 
-def solved(name, shape="given", **keys):
-    model = zoo.build(name, **keys)
-    analysis = fcid(shape, modal=given_shapes(model)) if shape == "given" else fcid(shape)
-    return model, run(model, analysis)
-
-
 @pytest.mark.parametrize("name", ["mixed backwards", "four-bar", "chain of 2"])
 def test_forces_at_any_time_are_those_at_outputs(name):
     """Replays ask for them at times that go to and fro; patches of all bodies serve all modes."""
-    model, outcome = solved(name)
+    model = zoo.build(name)
+    outcome = run(model, fcid("given", modal=given_shapes(model)))
     patches = {
         body.name: Patches(body.name, np.eye(body.n_modes), np.full(body.n_modes, np.inf)) for body in model.bodies
     }

@@ -11,12 +11,8 @@ from oracle_runs import run
 
 from ffrobot.mbs.quantities.link_loads import loads_on_links
 
-MECHANISMS = (*("mixed backwards", "four-bar", "tree", "mixed, as built", "slider-crank, as built"),)
-LOADS = ({"point": "link2.mid", "x": "3*cos(4*t)", "y": "2", "moment": "0.3*t"}, {"joint": "A", "moment": "4*sin(5*t)"})
-
-
-def link_loads(outcome, bodies):
-    return loads_on_links(outcome.motion, bodies)
+MECHANISMS = ("mixed backwards", "four-bar", "tree", "mixed, as built", "slider-crank, as built")
+LOAD = {"point": "link2.mid", "x": "3*cos(4*t)", "y": "2", "moment": "0.3*t"}
 
 
 def at_point(loads, point):
@@ -34,7 +30,7 @@ def missing(outcome):
     ):
         if node.body.name not in [body.name for body in outcome.robot.bodies]:
             continue  # output of a rotor
-        loads, p = link_loads(outcome, [node.body.name])[node.body.name].sizes, motion.q[:, node.p_q]
+        loads, p = loads_on_links(outcome.motion, [node.body.name])[node.body.name].sizes, motion.q[:, node.p_q]
         whole, given = np.hstack(needed), 0.0
         for point, at in node.body.points.items():
             force, moment = at_point(loads, point)
@@ -55,13 +51,13 @@ def test_loads_at_points_move_the_bodies(name):
 
 def test_inverse_dynamics_counts_what_motors_and_patches_do():
     """Not the force on the trajectory that stands for them: what is left to the modes is F_p."""
-    outcome = run(arm(arm_links(damping_ratio=0.02), load=LOADS[:1]), pcid(output_step=0.05))
+    outcome = run(arm(arm_links(damping_ratio=0.02), load=[LOAD]), pcid(output_step=0.05))
     for name, (left, largest) in missing(outcome).items():
         np.testing.assert_allclose(left[:, [0, 1, 5]], 0.0, atol=1e-9 * largest)
         F_p = outcome.F_p[:, outcome.modal_columns(name)]
         np.testing.assert_allclose(left[:, 6:], F_p, atol=1e-9 * largest)
-        np.testing.assert_allclose(link_loads(outcome, [name])[name].modal_force, F_p, atol=1e-9 * largest)
+        np.testing.assert_allclose(loads_on_links(outcome.motion, [name])[name].modal_force, F_p, atol=1e-9 * largest)
     np.testing.assert_allclose(
-        np.hstack(at_point(link_loads(outcome, ["link2"])["link2"].sizes, "tip")), 0.0, atol=1e-9
+        np.hstack(at_point(loads_on_links(outcome.motion, ["link2"])["link2"].sizes, "tip")), 0.0, atol=1e-9
     )
     assert np.abs(outcome.lambda_).max() > 1.0

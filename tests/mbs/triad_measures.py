@@ -141,12 +141,11 @@ class Lead(Row):
     """z·d − hα of a screw, h = lead/2π in m/rad."""
 
     h: float
-    turns: float = 0.0  # whole turns that the angle has behind it
 
     def between(self, a, b):
         way, turn = Way(self.a, self.b, Z).between(a, b), Turn(self.a, self.b).between(a, b)
         return Found(
-            way.value - self.h * (turn.value + 2 * np.pi * self.turns),
+            way.value - self.h * turn.value,
             way.on_a - self.h * turn.on_a,
             way.on_b - self.h * turn.on_b,
             way.extra - self.h * turn.extra,
