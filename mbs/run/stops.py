@@ -28,6 +28,7 @@ class _Ends(NamedTuple):
     bend: float = 4.0  # h ∫ |f''| of a step over the range of f: half a period of a sine (mbs/core: step_limit.h)
     rounds: int = 30  # of halving: 2^-30 of 1/2000 of the run is less than `shortest`
     shortest: float = 1e-9  # of a run, between two times: a spline through closer ones would swing
+    unseen: float = 1e-11  # of a run: before a jump, where a load acts that begins at the end of the step
     brief: float = 0.01  # of a run: pieces of a path or load that are shorter end steps in `parts` of them
     far: float = 20.0  # times the longest way of a piece in the time of the run: what a brief piece has to move
     parts: int = 16  # of such a piece
@@ -62,9 +63,9 @@ def stops(
             last = np.diff(breaks)
             is_far = way * duration > ENDS.far * last * way.max(initial=0.0)
             at.append(_parts(breaks, (last < ENDS.brief * duration) & is_far))
-    jumps = [np.append(load.switches(), _jumps(load, ends)) for load in loads]
-    # just before them, too: means over time are by the values on both sides
-    at += jumps + [each - ENDS.shortest * duration for each in jumps]
+    for load in loads:  # just before jumps, too: means over time are by the values on both sides
+        switches, jumps = np.array(load.switches()), _jumps(load, ends)
+        at += [switches, switches - ENDS.shortest * duration, jumps, jumps - ENDS.unseen * duration]
     if is_driven and duration > 0.0:
         grid = np.union1d(_even(ends), np.concatenate(at))
         at += [np.setdiff1d(_resolved(function, grid, ENDS.seen), grid) for function in (*targets, *loads)]
