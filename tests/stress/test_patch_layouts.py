@@ -1,4 +1,4 @@
-"""PZT layouts that are ill-conditioned: overlapping, where modes have no curvature, too many, too few."""
+"""PZT layouts that are ill-conditioned: patches nearly at the same place."""
 
 import numpy as np
 import pytest

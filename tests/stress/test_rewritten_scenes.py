@@ -1,4 +1,4 @@
-"""Random robots in 3D have the same results however they are written: some of the campaign `rewritten`."""
+"""Random robots in 3D have the same results however they are written."""
 
 import numpy as np
 import pytest
