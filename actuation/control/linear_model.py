@@ -152,7 +152,7 @@ class LinearModel(StateSpace):
         f, L_T, inverse = self.freedom, np.linalg.cholesky(self.mass).T, self.of_unit_mass
         A_K, A_D = L_T @ self.A[f:, :f] @ inverse, L_T @ self.A[f:, f:] @ inverse
         inputs, outputs = L_T @ self.B[f:], self.C[:, :f] @ inverse
-        return -1.0 * A_K, -1.0 * A_D, inputs, outputs
+        return -A_K, -A_D, inputs, outputs
 
     def frequency_response(self, omega: Array, inputs: Names, outputs: Names) -> ComplexArray:
         """Return the frequency response G(iω) (F, outputs, inputs) at `omega` (F,), rad/s; SI units."""
@@ -161,7 +161,7 @@ class LinearModel(StateSpace):
         columns, rows = self.inputs(inputs), self.outputs(outputs)
         X = np.linalg.solve(s**2 * np.eye(f) + s * D + K, B[None, :, columns])
         back, C = self.of_unit_mass @ X, self.C[rows]
-        return np.asarray((C[:, :f] + s * C[:, f:]) @ back + self.D[np.ix_(rows, columns)], dtype=complex)
+        return (C[:, :f] + s * C[:, f:]) @ back + self.D[np.ix_(rows, columns)]
 
 
 def state_space(
@@ -230,8 +230,7 @@ def save_arrays(arrays: Mapping[str, Any], path: Path) -> None:
     """Write arrays, names and numbers to a .npz or .mat file. Raises `InputError` for another suffix."""
     content = BytesIO()
     if path.suffix == ".npz":
-        converted: dict[str, Any] = {key: np.asarray(value) for key, value in arrays.items()}
-        np.savez_compressed(content, **converted)
+        np.savez_compressed(content, **arrays)
     elif path.suffix == ".mat":
         cells = {k: np.array(v, dtype=object) if isinstance(v, tuple) else v for k, v in arrays.items()}
         scipy.io.savemat(content, cells, oned_as="column")

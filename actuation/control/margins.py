@@ -138,7 +138,7 @@ def lowest_frequency(
         ringing = s[(s.imag > 0.0) & (-s.real < LIGHTLY * np.abs(s)) & (np.abs(s.imag) * T < np.pi * SAMPLED)]
         vibrating = ringing[np.abs(ringing) > RIGID * np.abs(s).max(initial=0.0)]
         locked = min(locked, float(vibrating.imag.min(initial=np.inf)) / (2 * np.pi))
-    return locked if np.isfinite(locked) else float("nan")
+    return locked if np.isfinite(locked) else np.nan
 
 
 def eigenvalue_count(loop: tuple[LinearModel, Feedback], T: float, delay: float) -> int:

@@ -179,7 +179,7 @@ def _last_crossing(t: Array, values: Array, level: float) -> float:
         return float(t[0])
     k = int(above[-1])
     if k + 1 == len(t):
-        return float("nan")
+        return np.nan
     near, step = slice(max(k - 1, 0), k + 3), t[k + 1] - t[k]
     x, y = (t[near] - t[k]) / step, values[near] - level
     roots = np.roots(np.polyfit(x, y, len(x) - 1))

@@ -331,7 +331,7 @@ class Observed:
         spread = np.reshape(np.transpose(around), (taken, len(columns), len(columns)))
         sigma = np.sqrt(np.einsum("tii->ti", spread).clip(min=0.0))
         moving = [k for k in range(len(columns)) if sigma[:, k].min(initial=np.inf) > 0.0]
-        nees, inside = float("nan"), float("nan")
+        nees = inside = np.nan
         if moving:
             e = error[:, moving]
             weighed = np.linalg.pinv(spread[:, moving][:, :, moving], rcond=HIDDEN, hermitian=True) @ e[..., None]

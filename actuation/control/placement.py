@@ -139,7 +139,7 @@ def place(
         raise InputError(f'{key}: expected modes that patches on "{layout.body}" can reach', "some they cannot")
 
     def gain(Phi_V: Array) -> Array:
-        return np.asarray(np.square(shape @ Phi_V) / largest[:, None])
+        return np.square(shape @ Phi_V) / largest[:, None]
 
     def judge(Phi_V: Array, capacitance: Array) -> Array:
         """Values (sets,) of sets of patches, Phi_V (m, sets, count) and capacitances (sets, count)."""
@@ -175,11 +175,11 @@ def place(
 def _measured(measure: str, reach: Array) -> Array:
     """Values (sets,) of the reach (modes, sets)."""
     if measure == "worst":
-        return np.asarray(reach.min(axis=0))
+        return reach.min(axis=0)
     if measure == "mean":
-        return np.asarray(reach.mean(axis=0))
+        return reach.mean(axis=0)
     with np.errstate(divide="ignore"):
-        return np.asarray(np.exp(np.log(reach).mean(axis=0)))
+        return np.exp(np.log(reach).mean(axis=0))
 
 
 def _voltages(shape: Array, Phi_V: Array, F_p: Array) -> Array:
@@ -205,7 +205,7 @@ def _search(room: int, offset: Indices, most_sets: int, judge: Callable[[Indices
         return sets[int(np.argmax(judge(sets)))], len(sets), "all sets"
 
     def decoded(y: Array) -> Indices:
-        return np.asarray(np.sort(np.round(y), axis=0).astype(np.intp).T + offset)
+        return np.sort(np.round(y), axis=0).astype(np.intp).T + offset
 
     compared = 0
 

@@ -94,7 +94,7 @@ class RigidArm:
         q, C_v = self.place(gamma)
         rates = np.zeros(len(C_v))
         rates[self._motors] = gamma_dot
-        v: Array = np.linalg.pinv(C_v) @ rates
+        v = np.linalg.pinv(C_v) @ rates
         self._system.core.keep_independent_rows(q, v)
         friction = -resistance(self._model, q[None], v[None])[0]
 

@@ -224,7 +224,7 @@ def _residual(exact: Array, of_modes: Array) -> Array:
     scale = np.sqrt(exact)[:, None]
     left, sizes, _ = np.linalg.svd(of_modes / scale, full_matrices=False)
     shapes = scale * left * sizes.clip(max=1.0)
-    return np.asarray(np.diag(exact) - shapes @ shapes.T)
+    return np.diag(exact) - shapes @ shapes.T
 
 
 def _strains(body: ModalBody, x: Array) -> Array:
@@ -366,7 +366,7 @@ def _outlined(layout: PztLayout, body: ModalBody, edges: Array) -> Array:
             "face: expected patches on faces that the link file outlines ([surface_patch] faces)",
             f'"{layout.face}", of which {missing[0]} has none outlined',
         )
-    return np.asarray(np.mean([outlined_on[face] for face in wanted], axis=0))
+    return np.mean([outlined_on[face] for face in wanted], axis=0)
 
 
 def _places(edges: Array) -> str:

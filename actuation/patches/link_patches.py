@@ -111,8 +111,7 @@ class LinkPatches:
 
     def on_link(self, modal: Mapping[str, Array]) -> Array:
         """Return modal forces (T, n), N/√kg, on modes of the link's file by forces `modal` on its `bodies`."""
-        found: Array = np.sum([modal[name] @ of.to_link.T for name, of in self.bodies.items() if name in modal], axis=0)
-        return found
+        return np.sum([modal[name] @ of.to_link.T for name, of in self.bodies.items() if name in modal], axis=0)
 
     def allocation(self, *, limited: bool) -> _core.Allocation:
         """Return the map from forces (m,) on the modes of `reach`, N/√kg, to voltages (k,), V, limited or not."""
@@ -139,7 +138,7 @@ class LinkPatches:
 
     def unmet(self, F_p: Array, voltages: Array) -> Array:
         """Return the part (T, n) of modal forces F_p (T, n), N/√kg, that voltages (T, k), V, of all patches leave."""
-        left: Array = F_p - voltages @ self.Phi_V.T
+        left = F_p - voltages @ self.Phi_V.T
         return left if self.on_kept is None else left @ self.on_kept
 
 

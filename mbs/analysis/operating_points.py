@@ -157,7 +157,7 @@ def open_loop_growth(run: Run) -> float:
             back = np.linalg.inv(np.linalg.cholesky(at.M)).T
             growth.append(robot_modes(back.T @ at.K @ back, back.T @ at.D @ back, back, at.transformation).growth)
     except (InputError, SolveError):
-        return float("nan")
+        return np.nan
     return float(np.mean([*growth[:-1], *growth[1:]]))  # the trapezoidal rule
 
 

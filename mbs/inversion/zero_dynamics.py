@@ -32,8 +32,7 @@ class LinearDynamics:
     def __call__(self, times: Array) -> Array:
         """M, D, K (3, T, n, n) at any `times` (T,), s, straight lines between those that are known."""
         inside = times.clip(self.times[0], self.times[-1])
-        known: Array = scipy.interpolate.make_interp_spline(self.times, [self.M, self.D, self.K], 1, axis=1)(inside)
-        return known
+        return scipy.interpolate.make_interp_spline(self.times, [self.M, self.D, self.K], 1, axis=1)(inside)
 
 
 def linear_dynamics(servo: Servo, times: Array, p: Array, v: Array, a: Array) -> LinearDynamics:

@@ -48,8 +48,7 @@ class RobotModes:
         """Damping ratios (f,) −(λ₁ + λ₂)/2√(λ₁ λ₂) of pairs of poles; NaN for frequency 0."""
         omega = 2 * np.pi * self.frequency
         with np.errstate(divide="ignore", invalid="ignore"):
-            ratio: Array = np.where(omega > 0.0, -self.poles.sum(axis=1).real / (2 * omega), np.nan)
-        return ratio
+            return np.where(omega > 0.0, -self.poles.sum(axis=1).real / (2 * omega), np.nan)
 
 
 def robot_modes(K: Array, D: Array, back: Array, transformation: Array) -> RobotModes:
@@ -72,7 +71,7 @@ def robot_modes(K: Array, D: Array, back: Array, transformation: Array) -> Robot
     shape = (back @ Z).T
     motion = shape @ transformation.T
     round_off = RIGID * float(np.sqrt(np.linalg.norm(K, 2))) if len(K) else 0.0
-    return RobotModes(poles, np.asarray(shape, dtype=complex), np.asarray(motion, dtype=complex), round_off)
+    return RobotModes(poles, shape.astype(complex), motion.astype(complex), round_off)
 
 
 def _pairs(poles: ComplexArray) -> Indices:
@@ -164,13 +163,13 @@ def free_coordinates(mechanism: LinearMechanism, condition: str) -> FreeCoordina
 def frequency_response(free: FreeCoordinates, J: Array, omega: Array) -> ComplexArray:
     """(F, k) motion per unit load along each row of the Jacobian `J` (k, f), m/N or rad/(N·m); `omega` (F,), rad/s."""
     J = J @ free.N
-    return np.asarray(np.einsum("ki,fik->fk", J, vibration(np.eye(len(J.T)), free.K, free.D, J, omega)))
+    return np.einsum("ki,fik->fk", J, vibration(np.eye(len(J.T)), free.K, free.D, J, omega))
 
 
 def vibration(M: Array, K: Array, D: Array, J: Array, omega: Array) -> ComplexArray:
     """Coordinates (F, f, k) (K + iωD − ω²M)⁻¹ Jᵀ by unit loads along rows of `J` (k, f), at `omega` (F,), rad/s."""
     w = omega[:, None, None]
-    return np.asarray(np.linalg.solve(K + 1j * w * D - w**2 * M, np.broadcast_to(J.T, (len(omega), *J.T.shape))))
+    return np.linalg.solve(K + 1j * w * D - w**2 * M, np.broadcast_to(J.T, (len(omega), *J.T.shape)))
 
 
 def free_directions(R: Array) -> Array:

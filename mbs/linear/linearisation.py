@@ -101,7 +101,7 @@ class LinearEquations:
         by_rate = core.a_v[s] @ H + B[s] @ H
         by_s = core.a_q[s] @ H + core.a_v[s] @ H_dot + B_dot @ H + B[s] @ (H_dot + B @ H)
         M = np.linalg.inv(core.a_f[np.ix_(s, s)])
-        sides: Array = self._signs[:, None] * self._signs
+        sides = self._signs[:, None] * self._signs
         H, H_dot = H * self._signs, H_dot * self._signs
         shares = {joint: frame_share(self.model, joint, q) for joint in self._on_frames}
         moments = {joint: along_s[self.model.motors[joint][0]] for joint in shares}

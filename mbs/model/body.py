@@ -196,7 +196,7 @@ class Body(Invariants):
     @property
     def spin_slope(self) -> Array:
         """H (3, n, n), skew, without unit: change of `spin` by deformation, h_a(p) = h0_a + pᵀH_a."""
-        S: Array = self.S_bar_kl
+        S = self.S_bar_kl
         return np.array([S[1, 2] - S[2, 1], S[2, 0] - S[0, 2], S[0, 1] - S[1, 0]])
 
 

@@ -333,6 +333,6 @@ def _unwound(angle: Array, rate: Array, times: Array, guess: float) -> tuple[Arr
     rough = h * (rate[1:] + rate[:-1]) / 2
     way = rough - h**2 * np.diff(slope) / 12
     turns = np.round((np.append(guess, way) - np.append(angle[0], np.diff(angle))) / (2 * np.pi))
-    whole: Array = angle + 2 * np.pi * np.cumsum(turns)
+    whole = angle + 2 * np.pi * np.cumsum(turns)
     off = np.abs(way - np.array([rough, np.diff(whole)])).max()
     return whole, bool(off < np.pi / 2)

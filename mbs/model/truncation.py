@@ -84,7 +84,7 @@ def interface_loads(body: Body, loaded: Sequence[str]) -> Array:
     B = np.vstack(rows)
     magnitude = np.linalg.norm(B, axis=1)
     moving = magnitude > IMMOBILE
-    return np.asarray((B[moving] / magnitude[moving, None]).T)
+    return (B[moving] / magnitude[moving, None]).T
 
 
 def _static_modes(squares: Array, B_T: Array) -> tuple[Array, Array]:

@@ -290,5 +290,5 @@ def misfits(function: TimeFunction, times: Array, order: int) -> Array:
     (T − 1, …) in the unit of that derivative, by the trapezoidal rule; 0 where not finite.
     """
     value, slope = function.sample(times.ravel())[order : order + 2].reshape(2, *times.shape)
-    missed: Array = np.abs(np.diff(value, axis=0) - 0.5 * np.diff(times, axis=0) * (slope[1:] + slope[:-1]))
-    return np.nan_to_num(missed, nan=0.0, posinf=0.0)
+    missed = np.diff(value, axis=0) - 0.5 * np.diff(times, axis=0) * (slope[1:] + slope[:-1])
+    return np.nan_to_num(np.abs(missed), nan=0.0, posinf=0.0)

@@ -53,8 +53,7 @@ def rates_on_rows(model: Model, q: Array, v: Array, locked: Booleans | None = No
     scales, now = model.joint_sizes if locked is None else np.where(locked, 0.0, model.joint_sizes), np.zeros(1)
     (C_v,) = model.constraints.natural_gradients(q[None], now, scales)
     (C_dot,) = model.constraints.rates(q[None], v[None], now)
-    moved: Array = v - scales * np.linalg.lstsq(C_v, C_dot / model.row_sizes, rcond=1e-10)[0]
-    return moved
+    return v - scales * np.linalg.lstsq(C_v, C_dot / model.row_sizes, rcond=1e-10)[0]
 
 
 def _with_gears_as_asked(model: Model, guess: State) -> State:
@@ -275,7 +274,7 @@ def regular_postures(model: Model, q: Array) -> Array:
 def are_regular(model: Model, q: Array, times: Array) -> Booleans:
     """(T,) whether postures q (T, n_q), rad and m, are far from singular ones at `times` (T,), s."""
     rank = min(len(model.rows), int(model.tree.joint_columns.sum()))
-    return np.asarray(singular_ratios(model, q, times, rank) > REGULAR)
+    return singular_ratios(model, q, times, rank) > REGULAR
 
 
 def as_guess(nodes: Sequence[Node], q: Array) -> str:

@@ -75,7 +75,7 @@ def commanded_rest(commanding: Run, since: float | None = None) -> Rest | None:
         return None
     q = commanding.q[-1]
     if analysis.is_algebraic:
-        return Rest(model, q, since, _lowest_frequency(model, q, end) or float("nan"))
+        return Rest(model, q, since, _lowest_frequency(model, q, end) or np.nan)
     try:
         q = Statics(model, end).equilibrium(q)
     except (SolveError, InputError):
@@ -93,7 +93,7 @@ def _lowest_frequency(model: Model, q: Array, t: float) -> float:
     at = statics.balance(q, np.arange(tree.n_v))
     free = null_space(at.gradient, DEPENDENT)
     if not free.shape[1]:
-        return float("nan")
+        return np.nan
     ways = statics.sizes[:, None] * free
     K, M = free.T @ statics.stiffness(q, at) @ free, ways.T @ mass_matrices(statics.system, q[None], t)[0] @ ways
     K, M, own = (K + K.T) / 2, (M + M.T) / 2, np.abs(K.diagonal())
@@ -173,7 +173,7 @@ def _settling(path: PPoly, place: Array, since: float, tolerance: float, lowest:
     times = np.interp(np.arange(PARTS * (len(knots) - 1) + 1) / PARTS, np.arange(len(knots)), knots)
     beyond, time_to = np.flatnonzero(off(times) > tolerance), 0.0
     if beyond.size and times[beyond[-1]] + window > end:
-        time_to = float("nan")
+        time_to = np.nan
     elif beyond.size:
         near = times[beyond[-1] : beyond[-1] + 2]
         time_to = float(scipy.optimize.brentq(lambda t: float(off(t)) - tolerance, *near)) - since
