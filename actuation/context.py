@@ -1,7 +1,5 @@
 """Context of analyses of robots with patches."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, field
 from typing import TYPE_CHECKING
@@ -20,6 +18,6 @@ class ActuatedContext(Context):
     """Context with `patches`, modal bodies of `links`, and equations of links `carrying` payloads, each by link."""
 
     _: KW_ONLY
-    patches: Mapping[str, LinkPatches] = field(default_factory=dict)
+    patches: "Mapping[str, LinkPatches]" = field(default_factory=dict)
     links: Mapping[str, ModalBody] = field(default_factory=dict)
     carrying: Mapping[str, Body] = field(default_factory=dict)

@@ -4,8 +4,6 @@ A user's own controller is a function of the setup, in a Python file, that retur
 docs/howto/control.md.
 """
 
-from __future__ import annotations
-
 import runpy
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -176,7 +174,7 @@ class PythonControl:
             )
         return u
 
-    def __copy__(self) -> PythonControl:
+    def __copy__(self) -> "PythonControl":
         """Make the controller anew, as at the start of a run: the state of the user's function cannot be copied."""
         return PythonControl(*self.made_by)
 

@@ -5,8 +5,6 @@ states of the controllers, the loop x(k+1) = F x(k) is stable where the spectral
 much all commands, or the delay, may grow until it is 1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -49,11 +47,11 @@ class Feedback:
     # (2, inputs) time constants and further delays of commands, s, by amplifiers; None without
     late: Array | None = None
 
-    def times(self, factor: float) -> Feedback:
+    def times(self, factor: float) -> "Feedback":
         """Return the law with all commands times a factor."""
         return replace(self, C=factor * self.C, D=factor * self.D)
 
-    def behind(self, A: Array, B: Array, C: Array, D: Array) -> Feedback:
+    def behind(self, A: Array, B: Array, C: Array, D: Array) -> "Feedback":
         """Return the law with discrete filters A (m, m), B (m, p), C (p, m), D (p, p), SI, of its readings."""
         if not len(A):
             return self

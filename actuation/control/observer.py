@@ -5,8 +5,6 @@ equation (Anderson and Moore, Optimal Filtering, 1979, ch. 4); a predictor has L
 commands that wait for their delay, and the filters of sensors.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import fields, replace
@@ -67,7 +65,7 @@ class Observer:
         """Spectral radius of `error`: below 1, estimation errors decay from sample to sample."""
         return float(np.abs(np.linalg.eigvals(self.error)).max(initial=0.0))
 
-    def towards(self, other: Observer, part: float) -> Observer:
+    def towards(self, other: "Observer", part: float) -> "Observer":
         """Return the observer with all matrices interpolated: `part` 0 is this one, 1 the other."""
         names = [each.name for each in fields(self) if each.name != "estimates"]
         mixed = {name: (1 - part) * getattr(self, name) + part * getattr(other, name) for name in names}
@@ -309,7 +307,7 @@ class Observed:
             )
         return u
 
-    def __copy__(self) -> Observed:
+    def __copy__(self) -> "Observed":
         """Make a copy with controllers as at the start of a run."""
         found = object.__new__(Observed)
         vars(found).update(vars(self), controllers=[copy(each) for each in self.controllers])

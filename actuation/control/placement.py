@@ -3,8 +3,6 @@
 Mass and stiffness of patches, where the scene adds them to the link, stay where the scene has the patches.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import combinations_with_replacement
@@ -69,7 +67,7 @@ class Evaluation:
 class Placed(Details):
     """Result of a search for patch positions."""
 
-    wanted: Placement  # the keys of the scene
+    wanted: "Placement"  # the keys of the scene
     # best, even: the patches found, and as many spread evenly
     best: Evaluation
     even: Evaluation
@@ -102,7 +100,7 @@ def locked_modes(model: LinearModel, link: PatchableLink, count: int) -> tuple[A
 
 def place(
     scene_path: Path,
-    wanted: Placement,
+    wanted: "Placement",
     link: PatchableLink,
     model: LinearModel | None,
     F_p: Array | None,
@@ -224,7 +222,7 @@ def _search(room: int, offset: Indices, most_sets: int, judge: Callable[[Indices
 
 
 def _candidates(
-    scene_path: Path, wanted: Placement, link: PatchableLink, count: int
+    scene_path: Path, wanted: "Placement", link: PatchableLink, count: int
 ) -> tuple[Array, int, Array, Array]:
     """Places (k,), m, for the center of a patch, how many two patches lie apart, Φ_V (m, k), capacitances (k,), F."""
     layout, whole = link.array.layout, link.array.link.length

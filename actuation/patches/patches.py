@@ -1,7 +1,5 @@
 """Piezoelectric patches on a link: what a volt does to its modal coordinates (Shabana 2022, Eqs. 14–17). SI units."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cached_property, lru_cache
 from itertools import pairwise
@@ -152,7 +150,7 @@ class Voltages:
     unmet: Array  # (T, n) N/√kg, modal forces that `within_limit` leaves
     served: int  # number of modes, the first ones, that the patches are to serve
 
-    def at(self, rows: Indices) -> Voltages:
+    def at(self, rows: Indices) -> "Voltages":
         """Return the voltages at some outputs alone, by their indices (k,)."""
         return Voltages(self.required[rows], self.within_limit[rows], self.unmet[rows], self.served)
 

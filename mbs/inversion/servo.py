@@ -1,7 +1,5 @@
 """A path whose force enters through the joint motors alone: see `zero_dynamics`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
@@ -74,7 +72,7 @@ class Servo:
         """Functions of time, s, one per component of trajectories, in the scene's order: m, rad, of directions 1."""
         return [function for path in self.model.scene.trajectory for _, function in path.targets]
 
-    def slowed(self, factor: float) -> Servo:
+    def slowed(self, factor: float) -> "Servo":
         """The robot on the path in `factor` times the time, by quintic Hermite pieces."""
         times = self.end * np.linspace(0.0, 1.0, PIECES + 1)
         inside = times.clip(TINY * self.end, (1.0 - TINY) * self.end)  # outside it rests

@@ -8,8 +8,6 @@ Of a voltage V over time the play operator of threshold r has z = max(V − r, m
 the voltage Σ w z (Prandtl and Ishlinskii). The inverse has the same form (Kuhnen, Eur. J. Control 9, 2003, eq. 20).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import fields, replace
 
@@ -37,7 +35,7 @@ class Hysteresis:
         return bool(self.weights[1:].any() or (self.weights[:1] != 1.0).any())
 
     @property
-    def inverse(self) -> Hysteresis:
+    def inverse(self) -> "Hysteresis":
         """Hysteresis from wanted effective voltages, V, to the voltages that patches need, from rest on."""
         W = np.cumsum(self.weights, axis=0)
         weights = np.diff(1.0 / W, axis=0, prepend=0.0)
@@ -122,7 +120,7 @@ class Amplifiers:
         weights[0] += none
         return Hysteresis(weights, inverse.thresholds)
 
-    def unlimited(self) -> Amplifiers:
+    def unlimited(self) -> "Amplifiers":
         """Return the same amplifiers without limits."""
         none = np.full_like(self.slew, np.inf)
         return replace(self, range=np.stack([-none, none]), slew=none, current=none)

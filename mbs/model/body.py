@@ -1,7 +1,5 @@
 """Bodies in the equations of motion: invariants of the (R, e, p) equations, and sections. SI units."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -42,12 +40,12 @@ class Stiffening:
         n = self.K_s.shape[-1]
         return self.K_points.get(point, np.zeros((6, n, n)))
 
-    def transformed(self, T: Array) -> Stiffening:
+    def transformed(self, T: Array) -> "Stiffening":
         """Return the stiffness in coordinates p' (m,) with p = T p', T (n, m) without unit."""
         points = {name: T.T @ K @ T for name, K in self.K_points.items()}
         return Stiffening(T.T @ self.K_s @ T, T.T @ self.K_x @ T, MappingProxyType(points), T.T @ self.S_turned @ T)
 
-    def with_payload(self, point: str, position: Array, phi: Array, mass: float, arm: Array, E: Array) -> Stiffening:
+    def with_payload(self, point: str, position: Array, phi: Array, mass: float, arm: Array, E: Array) -> "Stiffening":
         """Add a rigid payload: `mass`, kg, its center at `arm` (3,), m, from a point; E (3, 3) = ∫ρ ξ ξᵀ dV, kg·m².
 
         ξ is from its center; all are in the link's frame. `position` (3,), m, and `phi` = Φ_r (3, n), 1/(m·√kg), are of
@@ -64,7 +62,7 @@ class Stiffening:
             S_turned=self.S_turned + turned,
         )
 
-    def with_tool(self, name: str, point: str, phi: Array, arm: Array) -> Stiffening:
+    def with_tool(self, name: str, point: str, phi: Array, arm: Array) -> "Stiffening":
         """Add a point `name` at `arm` (3,), m, from a point of the body with `phi` = Φ_r (3, n), 1/(m·√kg)."""
         K = self.at(point).copy()
         K[:3] += np.einsum("lbmn,b->lmn", self._by_arm(point, phi), arm)
@@ -140,7 +138,7 @@ class Body(Invariants):
     points: Mapping[str, BodyPoint]  # its sections by name
     modal_transform: Array  # (n_file, n) from p to modal coordinates of the file, without unit
     length: float | None = None  # of a link in m; None of a rigid body
-    reduction: Reduction | None = None  # where it has fewer modes than its file
+    reduction: "Reduction | None" = None  # where it has fewer modes than its file
     attachment_modes: int = 0  # how many of the n, after all others, are static shapes of loads at interfaces
     stiffening: Stiffening | None = None  # geometric stiffness; left out of the equations where None
 
@@ -155,7 +153,7 @@ class Body(Invariants):
         return self.n_modes - self.attachment_modes
 
     @property
-    def whole(self) -> Body:
+    def whole(self) -> "Body":
         """The body with all modes of its file."""
         return self if self.reduction is None else self.reduction.whole
 

@@ -1,7 +1,5 @@
 """A tree in the core: its bodies and sections, and their motion in global axes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -197,7 +195,7 @@ class Kinematics:
         self.signs, self.scene = np.array([row.sign for row in rows]), markers.followed(rows)
 
     @classmethod
-    def of_points(cls, nodes: Sequence[Node]) -> Kinematics:
+    def of_points(cls, nodes: Sequence[Node]) -> "Kinematics":
         """Make the kinematics of frames and points of all bodies of a tree, and of sections at joints.
 
         `nodes`: its bodies, each with the joint that carries it, from the ground outwards.
@@ -210,7 +208,7 @@ class Kinematics:
         ]
         return cls(nodes, [*points, *still])
 
-    def places(self, q: Array, v: Array | None = None) -> Places:
+    def places(self, q: Array, v: Array | None = None) -> "Places":
         """Return positions (m) and motions (m/s, rad/s) at q (T, n_q) and v (T, n_v), by default at rest."""
         rates = np.zeros((len(q), self.core.n_v)) if v is None else v
         return Places(

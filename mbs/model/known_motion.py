@@ -1,7 +1,5 @@
 """Forces of known motions in 3D by the core's recursive Newton–Euler algorithm. SI units."""
 
-from __future__ import annotations
-
 from functools import cached_property
 from typing import NamedTuple, Protocol
 
@@ -20,7 +18,7 @@ class Wrench(NamedTuple):
     force: Array
     moment: Array
 
-    def seen_from(self, arm: Array) -> Wrench:
+    def seen_from(self, arm: Array) -> "Wrench":
         """Return the wrench about another point, from which the present one is at `arm` (T, 3), m, global axes."""
         return Wrench(self.force, self.moment + np.cross(arm, self.force))
 

@@ -1,7 +1,5 @@
 """The model of a robot that analyses share: tree and constraint equations, with natural sizes. SI units."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
@@ -25,7 +23,7 @@ LARGEST_TURN = 0.5  # rad (and sizes of the robot) that a Newton step may move: 
 class Constraints(Kinematics):
     """Constraint equations C(q, t) = 0 of a model, one for each of its `rows`, SI."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: "Model") -> None:
         super().__init__(model.tree.nodes, rows=model.rows)
         self._rows, self._row_sizes, self._joint_sizes = model.rows, model.row_sizes, model.joint_sizes
 
@@ -175,7 +173,7 @@ class Model:
         behind = {gear.joint.joint.name: gear.motor for gear in self.tree.gears}
         return behind.get(joint, self.tree.nodes[self.tree.carried[joint]])
 
-    def without_paths(self) -> Model:
+    def without_paths(self) -> "Model":
         """Return the robot without trajectories, with constraint equations of loops alone."""
         return replace(self, rows=tuple(row for row in self.rows if not row.is_trajectory))
 

@@ -8,8 +8,6 @@ is Gᵀf. The output of a rotor there is a massless body of the tree with the co
 that acts along the joint acts on it.
 """
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -124,7 +122,7 @@ class KinematicTree:
         first, second = zip(joint.between, joint.triads(), strict=True)
         return self.section(*first, joint.at), self.section(*second, joint.at)
 
-    def with_outputs(self, outputs: Sequence[tuple[JointRecord, str, Section]]) -> KinematicTree:
+    def with_outputs(self, outputs: Sequence[tuple[JointRecord, str, Section]]) -> "KinematicTree":
         """Return the tree with the output of a rotor's gear for each (joint, output's name, section).
 
         It is a massless body that moves on this section as the joint does. Outputs come after all bodies.
@@ -140,7 +138,7 @@ class KinematicTree:
         tree.carried = {node.joint.name: number for number, node in enumerate(nodes)}
         return tree
 
-    def with_bodies(self, bodies: Sequence[Body]) -> KinematicTree:
+    def with_bodies(self, bodies: Sequence[Body]) -> "KinematicTree":
         """Return the tree with other bodies of the same names, modes and points, in its order."""
         tree = copy.copy(self)
         tree.nodes = tuple(replace(node, body=body) for node, body in zip(self.nodes, bodies, strict=True))

@@ -4,8 +4,6 @@ Mode acceleration by residual vectors (Craig, Structural Dynamics, 1981, ch. 19;
 critique of mode acceleration and modal truncation augmentation methods, Comput. Struct. 62, 1997).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -66,7 +64,7 @@ def modes_kept(body: Body) -> str:
     return f"{lowest} of {body.reduction.whole.n_eigenmodes} modes{shapes}"
 
 
-def loaded_points(scene: MechanismKeys, body: str) -> list[str]:
+def loaded_points(scene: "MechanismKeys", body: str) -> list[str]:
     """Return names of points of a body at which joints, trajectories and loads of the scene act."""
     loaded = [reference.body_and_point for reference in scene.references() if reference.loaded]
     return list(dict.fromkeys(part[1] for part in loaded if part is not None and part[0] == body))

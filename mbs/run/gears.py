@@ -4,8 +4,6 @@ Inverse analyses and equilibria take gears for rigid. Twists δ = θ_m − γ, a
 torques follow from their motion by docs/theory.md, (26) and (27).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import count
@@ -196,11 +194,11 @@ def gear_motion(
     )
 
 
-def _read(curve: BSpline | PPoly, time: Array) -> Array:
+def _read(curve: "BSpline | PPoly", time: Array) -> Array:
     return np.column_stack([curve(time), curve.derivative(1)(time), curve.derivative(2)(time)])
 
 
-def _twist(gear: GearSpring, time: Array, moment: Array) -> scipy.interpolate.BSpline:
+def _twist(gear: GearSpring, time: Array, moment: Array) -> "scipy.interpolate.BSpline":
     """δ(t) with k(δ) + c δ̇ = `moment` at all outputs: a quintic spline without knots next to the ends.
 
     By Newton, which ends where no output changes its part of the spring. Raises `SolveError` where it does not.
