@@ -139,22 +139,22 @@ def side(layout: PztLayout) -> float:
 
 
 def bending_row(layout: PztLayout) -> int:
-    """Return the index in e = (φ_z', u', φ_x', −φ_y') of the curvature towards the patches' normal."""
+    """Return the index in e of the curvature towards the patches' normal."""
     return BEND_Y if layout.normal == "y" else BEND_Z
 
 
 def own_row(layout: PztLayout) -> int:
-    """Return the index in e = (φ_z', u', φ_x', −φ_y') of the strain that the layout actuates."""
+    """Return the index in e of the strain that the layout actuates."""
     return TWIST if layout.bends == "twist" else bending_row(layout)
 
 
 def across_row(layout: PztLayout) -> int:
-    """Return the index in e = (φ_z', u', φ_x', −φ_y') of the curvature across the patches' width."""
+    """Return the index in e of the curvature across the patches' width."""
     return BEND_Z if layout.normal == "y" else BEND_Y
 
 
 def felt_rows(layout: PztLayout) -> Indices:
-    """Return indices (any,) in e = (φ_z', u', φ_x', −φ_y') of strains that interact with the patches."""
+    """Return indices (any,) in e of strains that interact with the patches."""
     if layout.face is None:
         return np.array([own_row(layout)])
     return np.flatnonzero([True, True, layout.lamina.shears, True])

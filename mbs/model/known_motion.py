@@ -52,7 +52,7 @@ class States(Protocol):
 
 
 class KnownStates(NamedTuple):
-    """States q (T, n_q), v and a (T, n_v) of a tree: m, rad, √kg·m and these per s and s²."""
+    """`States` that are known as arrays."""
 
     q: Array
     v: Array

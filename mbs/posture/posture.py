@@ -108,7 +108,7 @@ def shape_in_redundant_loops(model: Model, q: Array, rows: Indices) -> str:
 def worst_posture(model: Model, times: Array, q: Array, loop_rank: int = -1) -> tuple[float, int]:
     """Least `Mobility.ratio` of singular values at `times` (T,), s, and q (T, n_q), and number of this time.
 
-    `loop_rank`: of loop equations with straight links; −1: that at q.
+    `loop_rank`: see `mobilities`.
     """
     ratios = [at.ratio for at in mobilities(model, q, times, loop_rank)]
     return min(ratios), int(np.argmin(ratios))
@@ -117,7 +117,7 @@ def worst_posture(model: Model, times: Array, q: Array, loop_rank: int = -1) -> 
 def describe_posture(model: Model, ratio: float, t: float, q: Array, *, is_end: bool, loop_rank: int = -1) -> str:
     """A message on the worst posture q (n_q,) of a path at t (s) with this `ratio` of singular values; "" if regular.
 
-    `is_end`: the run ends there. `loop_rank`: of loop equations with straight links; −1: that at q.
+    `is_end`: the run ends there; `loop_rank`: see `mobilities`.
     """
     if not ratio < NEARLY_SINGULAR:
         return ""
@@ -130,7 +130,7 @@ def describe_posture(model: Model, ratio: float, t: float, q: Array, *, is_end: 
 def describe_branches(model: Model, times: Array, q: Array, loop_rank: int) -> str:
     """A message if loops pass a singular posture at `times` (T,), s, and q (T, n_q), rad and m; else "".
 
-    `loop_rank`: of loop equations with straight links; −1: that at q.
+    `loop_rank`: see `mobilities`.
     """
     ratios = np.array([at.loop_ratio for at in mobilities(model, q, times, loop_rank)])
     worst = int(ratios.argmin())
