@@ -45,7 +45,6 @@ class ExpressionError(ValueError):
         message = f"expected an expression in t, found {excerpt!r}: {problem} at character {position}"
         super().__init__(message + (f" ({hint})" if hint else ""))
         self.position = position
-        self.hint = hint
 
 
 def parse_expression(text: str) -> TimeFunction:

@@ -22,9 +22,9 @@ class Wrench(NamedTuple):
         """Return the wrench about another point, from which the present one is at `arm` (T, 3), m, global axes."""
         return Wrench(self.force, self.moment + np.cross(arm, self.force))
 
-    def plus(self, other: Wrench, sign: float = 1.0) -> Wrench:
-        """Return the sum, or with sign −1 the difference."""
-        return Wrench(self.force + sign * other.force, self.moment + sign * other.moment)
+    def plus(self, other: "Wrench") -> "Wrench":
+        """Return the sum of two wrenches about one point."""
+        return Wrench(self.force + other.force, self.moment + other.moment)
 
 
 @struct
@@ -98,9 +98,9 @@ class MotionForces:
         table = self.system.core.without_work(q, of_joints)
         return [_wrench(table, number) for number in numbers]
 
-    def of_row(self, number: int) -> tuple[Wrench, Wrench]:
-        """Return the wrenches of constraint equation `number` on its sections a and b; 0 for joint coordinates."""
-        return _wrench(self.found.constraints, 2 * number), _wrench(self.found.constraints, 2 * number + 1)
+    def of_row(self, number: int) -> Wrench:
+        """Return the wrench of constraint equation `number` on its section b; 0 for joint coordinates."""
+        return _wrench(self.found.constraints, 2 * number + 1)
 
     @cached_property
     def at_points(self) -> list[list[tuple[Section, Wrench]]]:

@@ -72,11 +72,11 @@ def with_line_masses(body: Body, points: Sequence[BodyPoint], masses: Array, spi
     return _uncoupled(loaded, m_ff, stiffness)
 
 
-def _uncoupled(body: Body, m_ff: Array, added: Array | None = None) -> Body:
+def _uncoupled(body: Body, m_ff: Array, added: Array | float = 0.0) -> Body:
     """The body in modal coordinates that make m_ff (n, n) the identity, and K_ff, with what is `added`, diagonal."""
     if not body.n_modes:
         return body
-    T, stiffness = uncoupling(m_ff, np.diag(body.stiffness) + (0.0 if added is None else added))
+    T, stiffness = uncoupling(m_ff, np.diag(body.stiffness) + added)
     return transformed(body, T, stiffness)
 
 

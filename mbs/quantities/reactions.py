@@ -38,7 +38,7 @@ def _carried(run: Run, forces: MotionForces, q: Array) -> dict[str, Wrench]:
     wrenches = dict.fromkeys(loops, Wrench(nothing, nothing))  # that of a free joint
     for number, row in enumerate(model.rows):
         if not row.is_trajectory and row.coordinate < 0:  # else it turns a rotor, along the joint
-            wrenches[row.owner] = wrenches[row.owner].plus(forces.of_row(number)[1])
+            wrenches[row.owner] = wrenches[row.owner].plus(forces.of_row(number))
     for node, carried in zip(model.tree.nodes, forces.carried(q), strict=False):
         if node.joint.name in loops:
             continue

@@ -106,7 +106,7 @@ def mode_displacement(p: Array) -> Recovery:
 
 
 def mode_acceleration(
-    body: ModalBody, T: Array, p: Array, loads: Mapping[str, Array], sections: SectionLoads | None = None
+    body: ModalBody, T: Array, p: Array, loads: Mapping[str, Array], sections: SectionLoads | None
 ) -> Recovery:
     """Return the recovery by mode acceleration: modes without their static part, and loads with static stresses.
 
