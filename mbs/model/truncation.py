@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...common.arrays import Array
-from . import body as bodies
-from .body import Body
+from .body import Body, Reduction, transformed
 from .masses import coupled_blocks
 
 if TYPE_CHECKING:
@@ -47,10 +46,10 @@ def with_fewer_modes(body: Body, lowest: int, loaded: Sequence[str]) -> Body:
     if len(stiffness) >= body.n_modes:
         return body
     T = np.hstack([np.eye(body.n_modes)[:, kept], *shapes])
-    reduced = bodies.transformed(body, T, stiffness)
+    reduced = transformed(body, T, stiffness)
     static_shapes = len(stiffness) - lowest if body.attachment_modes else 0
     lift = T + (B_T - T @ (T.T @ B_T)) @ np.linalg.pinv(T.T @ B_T)
-    reduction = bodies.Reduction(body, lowest, T, lift)
+    reduction = Reduction(body, lowest, T, lift)
     return replace(reduced, reduction=reduction, attachment_modes=static_shapes)
 
 

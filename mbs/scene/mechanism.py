@@ -131,7 +131,6 @@ class MechanismKeys(Record):
         return [Edge(joint.between, self._rank(joint)) for joint in self.joint]
 
     def _rank(self, joint: AnyJoint) -> int:
-        followed = any(trajectory.coordinate_of == joint.name for trajectory in self.trajectory)
         if not joint.locates:
             return 5
         if joint.loop_equations is None or joint.asks_for_coordinate:
@@ -140,7 +139,7 @@ class MechanismKeys(Record):
             return 1
         if joint.name in self.read_joints:
             return 0
-        if followed:
+        if any(trajectory.coordinate_of == joint.name for trajectory in self.trajectory):
             return 1
         if joint.name in self.initial.named("joints") | self.initial.named("joint_rates"):
             return 2
@@ -204,7 +203,7 @@ def in_3d(scene: S) -> S:
     initial = scene.initial
     angles = _of_bodies(scene, initial.angles, initial.joints)
     rates = _of_bodies(scene, initial.rates, initial.joint_rates)
-    turning = [joint for joint in scene.joint if _turns(joint)]
+    turning = [joint for joint in scene.joint if joint.type == "revolute"]
     floating = [body for body, carrier in scene.topology.carriers.items() if carrier is None]
 
     def guesses(of_bodies: Values) -> dict[str, Any]:
@@ -227,14 +226,10 @@ def in_3d(scene: S) -> S:
         joints=named(initial.joints, initial.angles), joint_rates=named(initial.joint_rates, initial.rates)
     )
     joints = tuple(
-        joint if _turns(joint) else joint.model_copy(update={"rpy": (0.0, 0.0, _turn(angles, joint))})
+        joint if joint.type == "revolute" else joint.model_copy(update={"rpy": (0.0, 0.0, _turn(angles, joint))})
         for joint in scene.joint
     )
     return scene.model_copy(update={"joint": joints, "initial": kept.model_copy(update=start)})
-
-
-def _turns(joint: JointRecord) -> bool:
-    return joint.type == "revolute"
 
 
 def _turn(of_bodies: Values, joint: JointRecord) -> float:
@@ -257,6 +252,6 @@ def _of_bodies(scene: MechanismKeys, given: Values, of_joints: Mapping[str, Any]
     for body, carrier in spanning_forest([body.name for body in scene.body], edges).carriers.items():
         if carrier is not None and body not in angles:
             joint = scene.joint[carrier.joint]
-            turn = of_joints.get(joint.name, 0.0) if _turns(joint) else 0.0
+            turn = of_joints.get(joint.name, 0.0) if joint.type == "revolute" else 0.0
             angles[body] = angles.get(carrier.parent, 0.0) + (turn if joint.between[1] == carrier.own else -turn)
     return angles
