@@ -311,11 +311,12 @@ class LinkInMotion:
 
 def links_in_motion(run: Run, bodies: Mapping[str, tuple[ModalBody, Body]]) -> dict[str, LinkInMotion]:
     """Return the motion of each link by name; `bodies`: modal bodies and equations of these links."""
-    forces, links = actuator_forces(run), {}
+    forces = actuator_forces(run)
     assert forces is not None
-    for name, (modal, spatial) in bodies.items():
-        links[name] = LinkInMotion(modal, spatial, modal_coordinates(run, name), forces.modal[name])
-    return links
+    return {
+        name: LinkInMotion(modal, spatial, modal_coordinates(run, name), forces.modal[name])
+        for name, (modal, spatial) in bodies.items()
+    }
 
 
 def judge_actuators(

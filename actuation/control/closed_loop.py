@@ -386,24 +386,21 @@ def find_feedback(setup: Setup, controllers: Sequence[Controller], readings: Arr
                 found[k] += controller(first + k, y)
         return found
 
-    try:
-        with np.errstate(all="ignore"), redirect_stdout(StringIO()):  # once more, of what it printed
-            still = commands(np.zeros_like(reference))
-            for share in SIZES:
-                a, answers = share * size, np.zeros((len(size), *still[AT:].shape))
-                for j, each in enumerate(np.diag(a)):
-                    change = np.zeros_like(reference)
-                    change[AT] = each
-                    answers[j] = (commands(change) - still)[AT:]
-                signs = 2.0 * (-1.0) ** np.arange(len(a))
-                together = np.zeros_like(reference)
-                together[LATER] = signs * a
-                seen, expected = commands(together) - still, np.zeros_like(still)
-                expected[LATER:] = np.tensordot(signs, answers[:, : count - LATER], 1)
-                if np.abs(seen - expected).max(initial=0.0) <= LINEAR * np.abs(expected).max(initial=0.0):
-                    return _realized(setup, np.moveaxis(answers, 0, 2), a)
-    except SolveError:
-        pass
+    with suppress(SolveError), np.errstate(all="ignore"), redirect_stdout(StringIO()):  # once more, of what it printed
+        still = commands(np.zeros_like(reference))
+        for share in SIZES:
+            a, answers = share * size, np.zeros((len(size), *still[AT:].shape))
+            for j, each in enumerate(np.diag(a)):
+                change = np.zeros_like(reference)
+                change[AT] = each
+                answers[j] = (commands(change) - still)[AT:]
+            signs = 2.0 * (-1.0) ** np.arange(len(a))
+            together = np.zeros_like(reference)
+            together[LATER] = signs * a
+            seen, expected = commands(together) - still, np.zeros_like(still)
+            expected[LATER:] = np.tensordot(signs, answers[:, : count - LATER], 1)
+            if np.abs(seen - expected).max(initial=0.0) <= LINEAR * np.abs(expected).max(initial=0.0):
+                return _realized(setup, np.moveaxis(answers, 0, 2), a)
     return None
 
 

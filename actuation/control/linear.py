@@ -64,10 +64,11 @@ def _pairs(model: LinearModel) -> list[tuple[str, ...]]:
     own = [(motor, motor) for motor in motors]
     single = [(motor, output) for motor in motors for output in (motor, *places)]
     single = next((pairs for pairs in (single, own) if len(pairs) * model.freedom**3 <= MOST_WORK), [])
-    together = [(*motors, *motors)] if len(motors) > 1 else []
-    if len(motors) > 1:
-        for _, of_point in groupby(places, key=lambda place: place.rpartition("/")[0]):
-            together += [(*motors, *chosen) for chosen in combinations(of_point, len(motors))]
+    if len(motors) < 2:
+        return [*single]
+    together = [(*motors, *motors)]
+    for _, of_point in groupby(places, key=lambda place: place.rpartition("/")[0]):
+        together += [(*motors, *chosen) for chosen in combinations(of_point, len(motors))]
     return [*single, *together]
 
 

@@ -207,14 +207,13 @@ def margins(loops: Loops, T: float, delay: float) -> Margins:
 def _last_before(changed: Callable[[float], bool], values: Array, missing: float) -> float:
     """Where on the way along `values` a condition first changes, by bisection; `missing` where it never does."""
     before = float(values[0])
-    for value in map(float, values[1:]):
-        if changed(value):
-            after = value
+    for after in map(float, values[1:]):
+        if changed(after):
             while abs(after - before) > 1e-3 * max(abs(before), abs(after)):
                 middle = 0.5 * (before + after)
                 before, after = (before, middle) if changed(middle) else (middle, after)
             return 0.5 * (before + after)
-        before = value
+        before = after
     return missing
 
 

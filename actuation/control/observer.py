@@ -317,7 +317,6 @@ class Observed:
         """Return the estimates at the samples taken, compared with the true values (taken,), SI units, by name."""
         p, tip = self._p, self.tip
         taken = len(next(iter(truth.values())))
-        first = self.schedule.observers[0]
         values, times = self.estimates[:taken], self.setup.times[:taken]
         names = [name.removeprefix("estimate/") for name in self.setup.outputs[p:]]
         columns = [k for k, name in enumerate(names) if name.rpartition("/")[0] == f"point/{tip}"]
@@ -346,7 +345,7 @@ class Observed:
             sigma=sigma,
             nees=nees,
             inside=inside,
-            poles=np.linalg.eigvals(first.error).astype(complex),
+            poles=np.linalg.eigvals(self.schedule.observers[0].error).astype(complex),
         )
 
 

@@ -61,7 +61,7 @@ def zeros(model: LinearModel, inputs: Names, outputs: Names) -> Zeros:
     kinds = {model.output_names[k].partition("/")[0] for k in model.outputs(outputs)}
     peers = [k for k, name in enumerate(model.output_names) if name.partition("/")[0] in kinds]
     if weakest * np.abs(s) ** 2 <= STILL * np.linalg.norm(C[peers], axis=1).max(initial=0.0) * np.linalg.norm(b):
-        return Zeros(np.zeros(0, dtype=complex), np.zeros(0, dtype=complex))
+        return Zeros(*np.zeros((2, 0), dtype=complex))
     # While C z = 0 the inputs act as constraint forces: zeros are eigenvalues of N_Bᵀ (λ² I + λ D̂ + K̂) N
     N, N_B = free_directions(c), free_directions(b.T)
     mass, damping, stiffness = N_B.T @ N, N_B.T @ D @ N / scale, N_B.T @ K @ N / scale**2

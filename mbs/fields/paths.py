@@ -181,8 +181,7 @@ def averaged_step(times: Array) -> Piecewise:
     The highest derivative is constant between the sums of some of the times; the others follow by integration.
     """
     n = len(times)
-    instants = np.zeros(1)
-    signs = np.ones(1)
+    instants, signs = np.zeros(1), np.ones(1)
     for T in times:
         instants, signs = np.concatenate([instants, instants + T]), np.concatenate([signs, -signs])
     breaks = merged(instants)

@@ -251,8 +251,7 @@ def _jumps(columns: Sequence[str], times: Array, values: Array) -> Iterator[str]
             )
             continue
         usual = float(np.quantile(accelerations[:, k], 0.9)) if len(times) >= MANY else np.inf
-        sudden = accelerations[:, k] > min(SUDDEN, max(FAST, UNLIKE * usual))
-        odd = sudden & (off[:, k] > JUMP)
+        odd = (accelerations[:, k] > min(SUDDEN, max(FAST, UNLIKE * usual))) & (off[:, k] > JUMP)
         if odd.any():
             most = int(np.where(odd, off[:, k], 0.0).argmax())
             more = f", and at {odd.sum() - 1} more rows" if odd.sum() > 1 else ""
@@ -328,7 +327,6 @@ def interpolated(nodes: Array, values: Array, degree: int = 5, at_rest: bool = T
     """
     if degree == 1:
         return Piecewise(nodes, np.stack([difference_quotients(nodes, values)[1], values[:-1]], axis=1))
-    # Loaded here: a scene without waypoints does not pay for it.
     rest = [(m, np.zeros(values.shape[1])) for m in (1, 2)]
     curve = scipy.interpolate.make_interp_spline(nodes, values, k=degree, bc_type=(rest, rest) if at_rest else None)
     breaks = np.unique(curve.t)

@@ -363,11 +363,11 @@ class _Reduction:
             return planar
         if row.kind == _core.ConstraintKind.turn:
             return self._turn(planar, row)
-        f = self._direction(row)
-        g = self._of_marker(row.b) @ row.g if row.kind == _core.ConstraintKind.dot else row.g
-        if np.linalg.norm(f[:2]) <= EXACT or (row.kind == _core.ConstraintKind.dot and np.linalg.norm(g[:2]) <= EXACT):
+        f, is_dot = self._direction(row), row.kind == _core.ConstraintKind.dot
+        g = self._of_marker(row.b) @ row.g if is_dot else row.g
+        if np.linalg.norm(f[:2]) <= EXACT or (is_dot and np.linalg.norm(g[:2]) <= EXACT):
             return None
-        if row.kind != _core.ConstraintKind.dot:
+        if not is_dot:
             if _is_mixed(f):
                 planar.a = self._shifted_for(row, f)
             f[2] = 0.0

@@ -46,8 +46,7 @@ class CompliantGear(NamedTuple):
     def twist(self, q: Array, v: Array) -> tuple[Array, Array]:
         """Return the twist δ (…,), rad or m, and its rate δ̇, rad/s or m/s, at q (…, n_q), v (…, n_v)."""
         a, b = self.motor, self.joint
-        way, rate = q[..., a.q.start] - self.sign * q[..., b.q.start], v[..., a.v.start] - self.sign * v[..., b.v.start]
-        return way, rate
+        return q[..., a.q.start] - self.sign * q[..., b.q.start], v[..., a.v.start] - self.sign * v[..., b.v.start]
 
     def round_off(self, q: Array) -> float:
         """Return the round-off of the spring's torque, relative to the largest at q (T, n_q), rad and m.

@@ -75,8 +75,7 @@ def lasting(loads: ModalLoads, time: Array) -> ModalLoads:
         [np.zeros(loads.f.shape[1]), np.cumsum(0.5 * np.diff(time)[:, None] * (loads.f[1:] + loads.f[:-1]), axis=0)]
     )
     middle = np.clip(time, time[0] + half, time[-1] - half)
-    ends = (np.array([np.interp(middle + side, time, of) for of in impulse.T]).T for side in (-half, half))
-    first, last = ends
+    first, last = (np.array([np.interp(middle + side, time, of) for of in impulse.T]).T for side in (-half, half))
     return replace(loads, f=(last - first) / (2 * half))
 
 
@@ -103,8 +102,7 @@ def _eigenvalues(loads: ModalLoads) -> Iterator[tuple[float, Array]]:
     norms = np.append(np.sqrt(squares[order]), 0.0)
     for start in range(0, len(order), AT_ONCE):
         some = order[start : start + AT_ONCE]
-        S = np.tensordot(f[some], K, axes=1)
-        yield float(norms[start + len(some)]), np.linalg.eigvalsh(S)
+        yield float(norms[start + len(some)]), np.linalg.eigvalsh(np.tensordot(f[some], K, axes=1))
 
 
 OUTPUTS = 64  # at which Δp is found: those with the largest ‖S‖ ‖p‖, and as many with the largest ‖p‖

@@ -194,8 +194,7 @@ class Run:
     @property
     def time_reached(self) -> float:
         """End of the last step, s; if unknown, the last output."""
-        reached = self.statistics.time_reached
-        if reached is not None:
+        if (reached := self.statistics.time_reached) is not None:
             return reached
         return float(self.time[-1]) if len(self.time) else 0.0
 

@@ -80,9 +80,9 @@ def _inside(times: Array, ends: Array) -> Array:
     return every[(every > ends[0]) & (every < ends[1])]
 
 
-def _even(ends: Array) -> Array:
-    """(n,) s: the fewest times from ends[0] to ends[1]."""
-    return np.linspace(ends[0], ends[1], ENDS.intervals + 1)
+def _even(ends: Array, dense: int = 1) -> Array:
+    """(n,) s: times from ends[0] to ends[1], `dense` in each of the even intervals."""
+    return np.linspace(ends[0], ends[1], ENDS.intervals * dense + 1)
 
 
 def _brief_parts(function: TimeFunction, ends: Array) -> Array:
@@ -97,7 +97,7 @@ def _humps(function: TimeFunction, ends: Array) -> Array:
     Of times that are `ENDS.dense` times as close those in such intervals and in the ones next to them. Jumps are left
     out, but those back in one of the next two intervals: steps find them, and end at those that conditions tell.
     """
-    times = np.linspace(ends[0], ends[1], ENDS.intervals * ENDS.dense + 1)
+    times = _even(ends, ENDS.dense)
     values = np.nan_to_num(function.sample(times)[0])
     if ENDS.dense * np.abs(np.diff(values)).max() <= ENDS.hump * np.ptp(values):
         return times[:0]  # no interval has that much of the range
@@ -116,7 +116,7 @@ def _humps(function: TimeFunction, ends: Array) -> Array:
 
 def _jumps(load: TimeFunction, ends: Array) -> Array:
     """Times (n,) s behind jumps of a load, but at its switches."""
-    a = np.linspace(ends[0], ends[1], ENDS.intervals * ENDS.dense + 1)
+    a = _even(ends, ENDS.dense)
     at = misfits(load, a, 0) > ENDS.hump * np.ptp(load.sample(a)[0])
     at &= np.histogram(load.switches(), a)[0] == 0
     a, b = a[:-1][at], a[1:][at]
