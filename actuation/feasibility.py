@@ -229,6 +229,7 @@ def judge_patches(
     time: Array,
     p: Array,
     F_p: Array,
+    *,
     with_count: Callable[[int], float | None] | None,
 ) -> PatchFeasibility:
     """Return the requirements on the patches of one layout.
@@ -339,7 +340,7 @@ def judge_actuators(
                 continue
             trial = None if run.analysis.is_repeated else partial(_largest_voltage, run, link, array.layout)
             own, F_p = charge[:, of_link.columns(name)], array.modes.forces(link.F_p)
-            judged[name] = judge_patches(array, voltages[name], own, run.time, link.p, F_p, trial)
+            judged[name] = judge_patches(array, voltages[name], own, run.time, link.p, F_p, with_count=trial)
     return Feasibility(judge_motors(run), judged, find_unsupplied(run, links, patches, voltages, others))
 
 

@@ -221,7 +221,7 @@ def test_field_between_interdigitated_electrodes():
     of_link = link_patches([layout(fibre_angle=0.0)], body, from_modal_body("link", body))
     array, volts = of_link.arrays["link"], of_link.voltages(F_p @ np.eye(12, body.mode_count))["link"]
     p, forces = np.zeros((2, body.mode_count)), np.zeros((2, len(array.Phi_V)))
-    judged = judge_patches(array, volts, 0.0 * volts.required, time, p, forces, None)
+    judged = judge_patches(array, volts, 0.0 * volts.required, time, p, forces, with_count=None)
     np.testing.assert_allclose(judged.field, np.abs(volts.required).max(axis=0) / 0.5e-3, rtol=1e-12)
 
 
