@@ -36,7 +36,7 @@ def read_link(source: LinkSource) -> Link:
         of_kind = chain(_solid_materials(solid), _surface_patches(solid))
     else:
         raise InputError(f'{path}: geometry.kind: expected "beam" or "solid"', repr(kind))
-    for key, expected, given in chain(slips, _same_places(link), _modes(link), _measured(link), of_kind):
+    for key, expected, given in chain(slips, _places(link), _modes(link), _measured(link), of_kind):
         raise InputError(f"{path}: {key}: expected {expected}", given)
     return link
 
@@ -81,17 +81,7 @@ def _beam_mesh(link: BeamLink) -> Slips:
         yield "mesh.nodes", f"a node at every step of the section, {missing} too", mesh.nodes
 
 
-def _names(link: Link) -> Slips:
-    # `mid` is the name under which results give the point at exactly half length.
-    taken = {"mid"}
-    for interface in link.interface:
-        if interface.name in taken:
-            yield "interface.name", f"a name besides {', '.join(sorted(taken))}", interface.name
-        taken.add(interface.name)
-
-
 def _beam_interfaces(link: BeamLink) -> Slips:
-    yield from _names(link)
     for interface in link.interface:
         key = f"interface.{{}} of {interface.name}"
         for name in ("normal", "group"):
@@ -102,12 +92,18 @@ def _beam_interfaces(link: BeamLink) -> Slips:
                 yield key.format("position"), "none: it is an end of the beam", interface.position
         elif not isinstance(interface.position, float):
             yield key.format("position"), "one number, m from the root", interface.position
-        elif interface.position > link.geometry.length:
-            yield key.format("position"), f"within the length, {link.geometry.length}", interface.position
 
 
-def _same_places(link: Link) -> Slips:
-    """Interfaces at one place cannot move by themselves, as those of Craig–Bampton modes do."""
+def _places(link: Link) -> Slips:
+    """Names differ; interfaces at one place cannot move by themselves, as those of Craig–Bampton modes do."""
+    names = {"mid"}  # under which results have the point at exactly half length
+    for interface in link.interface:
+        if interface.name in names:
+            yield "interface.name", f"a name besides {', '.join(sorted(names))}", interface.name
+        names.add(interface.name)
+        if isinstance(interface.position, float) and interface.position > link.geometry.length:
+            key = f"interface.position of {interface.name}"
+            yield key, f"within the length, {link.geometry.length}", interface.position
     if link.reference.condition != "craig-bampton":
         return
     taken: dict[object, str] = {}
@@ -210,7 +206,6 @@ def _solid_mesh(link: SolidLink) -> Slips:
 
 
 def _solid_interfaces(link: SolidLink) -> Slips:
-    yield from _names(link)
     for interface in link.interface:
         key = f"interface.{{}} of {interface.name}"
         is_end = interface.name in ("root", "tip")
@@ -219,11 +214,8 @@ def _solid_interfaces(link: SolidLink) -> Slips:
             yield key.format("normal"), "it only with a position of three numbers", interface.position
         if isinstance(interface.position, tuple) and interface.normal is None:
             yield key.format("normal"), "the outward normal of the face at position", "none"
-        if isinstance(interface.position, float):
-            if interface.position > link.geometry.length:
-                yield key.format("position"), f"within the length, {link.geometry.length}", interface.position
-            if interface.coupling == "rigid":
-                yield key.format("coupling"), '"mean" for a cross section inside the part', '"rigid"'
+        if isinstance(interface.position, float) and interface.coupling == "rigid":
+            yield key.format("coupling"), '"mean" for a cross section inside the part', '"rigid"'
         is_supported = interface.name == "root" or (interface.name == "tip" and not link.reference.holds_root)
         if is_supported and interface.coupling == "mean" and link.coupling == "rigid":
             expected = '"rigid", or coupling = "mean" in [reference], which holds this face'
