@@ -3,9 +3,11 @@
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
+from math import nan
 from types import ModuleType
+from typing import Any
 
-from .tables import shown
+from .tables import LARGEST, shown
 
 
 class FfrobotError(Exception):
@@ -144,6 +146,17 @@ def check_known(word: str, known: Collection[str], expected: str) -> None:
     """Raise `InputError` with the text `expected`, and the word as found, unless `word` is one of `known`."""
     if word not in known:
         raise InputError(expected, f'"{shown(word)}"{did_you_mean(word, known)}')
+
+
+def finite(value: Any, where: object) -> float:
+    """Return `value` as a number. Raises `InputError`, beginning with `where`, unless it is one up to `LARGEST`."""
+    try:
+        number = nan if isinstance(value, bool) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = nan
+    if not abs(number) <= LARGEST:  # False of NaN
+        raise InputError(f"{where}: expected a finite number up to {LARGEST:g}", f'"{shown(str(value))}"')
+    return number
 
 
 def quoted(words: Iterable[str]) -> str:

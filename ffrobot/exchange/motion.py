@@ -1,7 +1,6 @@
 """Motions of joints: from results to other programs, and from planners and recordings to waypoints."""
 
 import json
-import math
 import tempfile
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,10 +11,10 @@ from typing import Any, Literal
 import numpy as np
 
 from ..common.arrays import Array, Integers
-from ..common.errors import InputError, blaming_file, check_known, naming, quoted
+from ..common.errors import InputError, blaming_file, check_known, finite, naming, quoted
 from ..common.libraries import extras, scipy
 from ..common.structs import struct
-from ..common.tables import LARGEST, as_csv, shown
+from ..common.tables import as_csv, shown
 from ..common.toml_files import read_text
 from ..mbs.fields.waypoints import Recorded, Waypoints
 from ..results.file import Results
@@ -289,17 +288,7 @@ def _row(joints: Sequence[str], point: Any, k: int, begin: float) -> Row:
     if not isinstance(positions, list) or len(positions) != len(joints):
         other = len(positions) if isinstance(positions, list) else type(positions).__name__
         raise InputError(f"point {k}: expected {len(joints)} positions, one for each joint", other)
-    return begin + _seconds(point.get("time_from_start"), k), [_number(value, f"point {k}") for value in positions]
-
-
-def _number(value: Any, where: str) -> float:
-    try:
-        number = math.nan if isinstance(value, bool) else float(value)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
-    if not abs(number) <= LARGEST:  # False of NaN
-        raise InputError(f"{where}: expected finite numbers up to {LARGEST:g}", shown(str(value)))
-    return number
+    return begin + _seconds(point.get("time_from_start"), k), [finite(value, f"point {k}") for value in positions]
 
 
 def _seconds(duration: Any, k: int) -> float:
@@ -312,8 +301,8 @@ def _seconds(duration: Any, k: int) -> float:
             next((duration[key] for key in keys if key in duration), 0)
             for keys in (("sec", "secs", "seconds"), ("nanosec", "nsecs", "nanos", "nanoseconds"))
         )
-        return _number(whole, where) + _number(parts, where) / NANO
-    return _number(duration.removesuffix("s") if isinstance(duration, str) else duration, where)
+        return finite(whole, where) + finite(parts, where) / NANO
+    return finite(duration.removesuffix("s") if isinstance(duration, str) else duration, where)
 
 
 def _record(joints: Sequence[str], rows: Sequence[Row], velocities: Sequence[Any], *remarks: str) -> Recorded:
@@ -387,7 +376,7 @@ def _states(topics: Mapping[str, Iterator[tuple[int, Any]]]) -> Recorded:
             stamp = message.header.stamp.sec * NANO + message.header.stamp.nanosec
             for name, position in zip(message.name, message.position.tolist(), strict=True):
                 if owner.setdefault(name, topic) == topic:
-                    samples.setdefault(name, []).append((stamp, at, _number(position, f"joint {shown(name)}")))
+                    samples.setdefault(name, []).append((stamp, at, finite(position, f"joint {shown(name)}")))
                 elif name not in others.setdefault(topic, []):
                     others[topic].append(name)
     read = quoted(dict.fromkeys(owner.values())).replace('"', "")

@@ -15,11 +15,11 @@ from xml.parsers import expat
 import numpy as np
 
 from ...common.arrays import Array
-from ...common.errors import InputError, check_known, naming, quoted
+from ...common.errors import InputError, check_known, finite, naming, quoted
 from ...common.keys import LONGEST_NAME
 from ...common.rotations import of_quaternion, of_rpy, point_inertia, rpy_of
 from ...common.structs import struct
-from ...common.tables import LARGEST, shown
+from ...common.tables import shown
 from ...common.toml_files import read_bytes
 from ...mbs.model.body import Body
 
@@ -473,7 +473,7 @@ def _origin(element: Element) -> Origin:
 
 
 def _number(element: Element, key: str, default: str = "") -> float:
-    return _finite(_text(element, key, default), element, key)
+    return finite(_text(element, key, default), f"<{element.tag}>: {key}")
 
 
 def _numbers(element: Element, key: str, default: str = "0 0 0") -> list[float]:
@@ -481,17 +481,7 @@ def _numbers(element: Element, key: str, default: str = "0 0 0") -> list[float]:
     text, count = element.get(key, default), len(default.split())
     if len(parts := text.split()) != count:
         raise InputError(f"<{element.tag}>: {key}: expected {count} numbers", f'"{shown(text)}"')
-    return [_finite(part, element, key) for part in parts]
-
-
-def _finite(text: str, element: Element, key: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not abs(value) <= LARGEST:  # False of NaN
-        raise InputError(f"<{element.tag}>: {key}: expected a finite number up to {LARGEST:g}", f'"{shown(text)}"')
-    return value
+    return [finite(part, f"<{element.tag}>: {key}") for part in parts]
 
 
 def _root_of(links: Sequence[str], joints: Sequence[UrdfJoint]) -> str:
@@ -510,11 +500,10 @@ def _root_of(links: Sequence[str], joints: Sequence[UrdfJoint]) -> str:
             )
         carried[joint.child] = joint.name
     roots = [name for name in links if name not in carried]
-    if not roots:
-        raise InputError("expected one link that no joint carries", "none: the joints form a circle")
-    if len(roots) > 1:
+    if len(roots) != 1:
+        several = f"{len(roots)}: {quoted(roots)}; join them by fixed joints"
         raise InputError(
-            "expected one link that no joint carries", f"{len(roots)}: {quoted(roots)}; join them by fixed joints"
+            "expected one link that no joint carries", several if roots else "none: the joints form a circle"
         )
     reached = roots.copy()
     for link in reached:  # which grows
