@@ -107,19 +107,14 @@ def _start(tests: Path, target: RobotTarget, pose: MeasuredPose) -> Initial | No
 
 
 Equations = Callable[[Array], Sequence[Array]]
-"""Function of the parameters (n,) that returns `stacked` equations of all poses, always in the same coordinates."""
-
-
-def stacked(M: Array, K: Array, D: Array, J: Array) -> Array:
-    """Return one array (3 f + r, f) of M, K, D (f, f) and J (r, f), displacements per coordinate; SI units.
-
-    f free coordinates; J has a row for each of the r directions of `MeasuredPose.ends`.
-    """
-    return np.vstack([M, K, D, J])
+"""Function of the parameters (n,): arrays of M, K, D, J (`unstacked`) of all poses, always in the same coordinates."""
 
 
 def unstacked(equations: Array) -> list[Array]:
-    """Return M, K, D (f, f) and J (r, f), SI units, of `stacked` equations (3 f + r, f)."""
+    """Return M, K, D (f, f) and J (r, f), displacements per coordinate, SI units, of one array (3 f + r, f).
+
+    f free coordinates; J has a row for each of the r directions of `MeasuredPose.ends`.
+    """
     f = equations.shape[1]
     return np.split(equations, [f, 2 * f, 3 * f])
 
@@ -129,7 +124,7 @@ def receptance(
 ) -> tuple[ComplexArray, ComplexArray]:
     """Return receptances H (F, p), m/N, of the p FRFs of a pose at its F frequencies, and derivatives (n, F, p).
 
-    `equations` (3 f + r, f) are M, K, D and J in one array (`stacked`). Derivatives, m/N per unit of a parameter, are
+    `equations` (3 f + r, f) are M, K, D and J in one array (`unstacked`). Derivatives, m/N per unit of a parameter, are
     those along n `changes`, each the derivative of `equations` by a parameter.
     """
     (M, K, D, J), f, r = unstacked(equations), pose.ends.force, pose.ends.response
@@ -156,7 +151,7 @@ class PoseModel:
         self._rest: Array | None = None  # the first equilibrium
 
     def at(self, robot: Solution) -> Array:
-        """Return M, K, D (f, f), J (r, f) of a robot about its equilibrium in the pose, SI units: an array (`stacked`).
+        """Return M, K, D (f, f), J (r, f) of a robot about its equilibrium in the pose, SI units, in one array.
 
         Raises `InputError` for unknown points, `SolveError` without an equilibrium.
         """
@@ -173,7 +168,7 @@ class PoseModel:
             self._free = free_coordinates(linear, COMPLIANT).N if self._motors == "locked" else np.eye(len(linear.M))
         N, d = self._free, len(SPACES[robot.model.scene.space].translations)
         J = np.array([np.array(row.axis[:d]) @ linear.points[row.point][:d] for row in self.pose.ends.directions])
-        return stacked(N.T @ linear.M @ N, N.T @ linear.K @ N, N.T @ linear.D @ N, J @ N)
+        return np.vstack([N.T @ linear.M @ N, N.T @ linear.K @ N, N.T @ linear.D @ N, J @ N])
 
 
 STEP = 1e-4  # relative, for derivatives of the equations
@@ -311,7 +306,7 @@ class _Residuals:
 def differentiated(equations: Equations, values: Array, place: Sequence[Array]) -> list[tuple[Array, ...]]:
     """Return derivatives of the poses' equations, [pose][parameter], by forward differences per unit of parameter.
 
-    `place`: M, K, D, J of each pose in one array (`stacked`), as `equations` returns them at parameters `values` (n,).
+    `place`: M, K, D, J of each pose in one array (`unstacked`), as `equations` returns them at `values` (n,).
     """
     found = []
     for step in np.diag(STEP * values):
@@ -338,7 +333,7 @@ def fit_receptances(
 ) -> ResponseFit:
     """Find the parameters, from `start` (n,) on, whose FRFs are nearest to those measured in `poses`.
 
-    `equations` returns M, K, D, J of each pose in one array (`stacked`) for parameters (n,) in units of `keys`. Poses
+    `equations` returns M, K, D, J of each pose in one array (`unstacked`) for parameters (n,) in units of `keys`. Poses
     for validation are only compared.
 
     Raises:

@@ -15,7 +15,7 @@ from tables_3d import joint, pin, planar
 
 import ffrobot
 from ffrobot.common.errors import InputError
-from ffrobot.fit.frf import fit_receptances, stacked, unstacked
+from ffrobot.fit.frf import fit_receptances, unstacked
 from ffrobot.fit.frf_measured import Direction, MeasuredPose, ResponseTest, read_tests
 
 LINES = np.linspace(2.0, 60.0, 200)  # Hz
@@ -26,7 +26,7 @@ CHAIN_KEYS = ["k1", "k2", "k3", "c1", "c2", "c3", "m3"]
 def chain(values):
     """Three masses in a row."""
     of = [np.array([[a + b, -b, 0], [-b, b + c, -c], [0, -c, c]]) for a, b, c in (values[:3], values[3:6])]
-    return stacked(np.diag([2.0, 1.5, values[6]]), *of, np.eye(3))
+    return np.vstack([np.diag([2.0, 1.5, values[6]]), *of, np.eye(3)])
 
 
 def continued(values, w):
@@ -67,7 +67,7 @@ def loaded(values):
     """A mass on two modes, the second stiff, in coordinates that it uncouples."""
     mass, damper = values
     squares, V = eigh(np.diag([1e4, 1e9]), np.eye(2) + mass)
-    return stacked(np.eye(2), np.diag(squares), damper * V.T @ V, V[:1] + V[1:])
+    return np.vstack([np.eye(2), np.diag(squares), damper * V.T @ V, V[:1] + V[1:]])
 
 
 def test_deviations_do_not_depend_on_the_start():
@@ -89,7 +89,7 @@ def test_deviations_of_some_tests_alone_are_refused(keys):
 
 
 def block(k, d, m, J):
-    return stacked(np.diag(m), np.diag(k), np.diag(d), np.array(J))
+    return np.vstack([np.diag(m), np.diag(k), np.diag(d), np.array(J)])
 
 
 TOGETHER = r"k1 times c\S*, k2 times"
