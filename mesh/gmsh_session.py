@@ -15,6 +15,7 @@ from tempfile import TemporaryFile
 import gmsh
 import numpy as np
 
+from ..common.arrays import Array, Integers
 from ..common.errors import InputError, is_own_fault
 from .cells import SLIVER, VOLUME_ELEMENTS, cell_quality
 from .records import CIRCLE, GROWTH
@@ -93,11 +94,9 @@ def mesh_model(size: float, metres: float) -> None:
 
 
 def _has_slivers() -> bool:
-    tags, points, _ = gmsh.model.mesh.getNodes()
-    place = np.zeros(int(tags.max()) + 1, dtype=np.int64)
-    place[tags.astype(np.int64)] = np.arange(len(tags))
+    points, number = _nodes()
     _, _, nodes = gmsh.model.mesh.getElements(3)
-    corners = points.reshape(-1, 3)[place[np.concatenate(nodes).astype(np.int64)].reshape(-1, 4)]
+    corners = points[number[np.concatenate(nodes).astype(np.int64)].reshape(-1, 4)]
     return bool(np.min(cell_quality(corners, "tetrahedron")) < SLIVER)
 
 
@@ -137,12 +136,18 @@ def own_entities(dim: int = -1) -> list[tuple[int, int]]:
     return [entity for entity in gmsh.model.getEntities(dim) if not gmsh.model.getType(*entity).startswith("Ghost")]
 
 
-def extract_mesh() -> RawMesh:
-    """The volume and surface elements and lines of the gmsh model, with the names of its physical groups."""
+def _nodes() -> tuple[Array, Integers]:
+    """(p, 3) the nodes of the gmsh model, and their numbers, from 0, by tag; −1 of none."""
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    mesh = RawMesh(np.reshape(coordinates, (-1, 3)))
     number = np.full(int(tags.max(initial=0)) + 1, -1, dtype=np.int64)
     number[tags.astype(np.int64)] = np.arange(len(tags))
+    return np.reshape(coordinates, (-1, 3)), number
+
+
+def extract_mesh() -> RawMesh:
+    """The volume and surface elements and lines of the gmsh model, with the names of its physical groups."""
+    points, number = _nodes()
+    mesh = RawMesh(points)
     for dim, entity in [*own_entities(3), *gmsh.model.getEntities(2), *gmsh.model.getEntities(1)]:
         physical = gmsh.model.getPhysicalGroupsForEntity(dim, entity)
         names = [gmsh.model.getPhysicalName(dim, tag) or str(tag) for tag in physical]

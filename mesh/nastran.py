@@ -205,6 +205,7 @@ class _Deck:
         self._frames: dict[int, Frame | None] = {0: GLOBAL}
         for card in cards(path):
             self._take(card)
+        self._places = {number: k for k, number in enumerate(self.grids)}
 
     def _take(self, card: Card) -> None:
         name = card.name
@@ -239,11 +240,10 @@ class _Deck:
     def mesh(self) -> RawMesh:
         if not self.grids and not self.solids:
             raise InputError("expected GRID and CTETRA or CHEXA cards", "none")
-        place = {number: k for k, number in enumerate(self.grids)}
         of_kind: dict[str, list[tuple[list[int], int]]] = {}
         for card in self.solids.values():
             kind, nodes = _nodes(card)
-            row = [self._place(place, node, card) for node in nodes], card.whole(1, card.whole(0))
+            row = [self._place(node, card) for node in nodes], card.whole(1, card.whole(0))
             of_kind.setdefault(kind, []).append(row)
         raw = RawMesh(
             self._points(list(self.grids.values())),
@@ -255,7 +255,7 @@ class _Deck:
             groups = [(str(number), np.flatnonzero(owner == number)) for number in np.unique(owner).tolist()]
             raw.add_solids(kind, in_gmsh_order(kind, np.array([nodes for nodes, _ in rows]), _AS_VTK), groups)
         for card in self.shells.values():
-            corners = [self._place(place, card.whole(2 + k), card) for k in range(_SHELLS[card.name])]
+            corners = [self._place(card.whole(2 + k), card) for k in range(_SHELLS[card.name])]
             name = str(card.whole(1, card.whole(0)))
             raw.facet_groups.setdefault(name, []).append(np.array([corners], dtype=np.int64))
         return raw
@@ -275,11 +275,10 @@ class _Deck:
                 offset, lost = np.zeros(3), f"{lost} and its offset in {frame.kind} axes"
         return PointMass(f"{card.name} {card.whole(0)}{lost}, {card.place}", card.real(3), point + offset)
 
-    @staticmethod
-    def _place(place: dict[int, int], node: int, card: Card) -> int:
-        if node not in place:
-            raise InputError(f"{card}: expected existing grid points", node)
-        return place[node]
+    def _place(self, node: int, asked: Card) -> int:
+        if node not in self._places:
+            raise InputError(f"{asked}: expected existing grid points", node)
+        return self._places[node]
 
     def _points(self, cards: Sequence[Card]) -> Array:
         """(p, 3) of grid points, in the basic system."""
@@ -315,8 +314,7 @@ class _Deck:
 
     def _point(self, number: int, asked: Card) -> Array:
         """(3,) of a grid point, in the basic system."""
-        if number not in self.grids:
-            raise InputError(f"{asked}: expected existing grid points", number)
+        self._place(number, asked)  # raises where there is none
         return self._points([self.grids[number]])[0]
 
 
