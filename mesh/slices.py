@@ -72,8 +72,6 @@ def _above(f: Array, at_end: bool, tolerance: float) -> Booleans:
 def _extent(mesh: Mesh) -> tuple[float, float]:
     x = mesh.geometry.x[:, 0]
     local = (x.min(), x.max()) if x.size else (np.inf, -np.inf)
-    if mesh.comm.size == 1:
-        return local
     ranges = np.array(mesh.comm.allgather(local))
     return float(ranges[:, 0].min()), float(ranges[:, 1].max())
 
@@ -132,10 +130,11 @@ def _march(cells: _Cells, at_end: bool, tolerance: float) -> _Triangles:
     f_ends = f[cell[:, None, None], edges]
     t = np.clip(f_ends[..., 0] / (f_ends[..., 0] - f_ends[..., 1]), 0.0, 1.0)
     ends = points[edges]
-    corners = ends[..., 0, :] + t[..., None] * (ends[..., 1, :] - ends[..., 0, :])
+    along = ends[..., 1, :] - ends[..., 0, :]
+    corners = ends[..., 0, :] + t[..., None] * along
     if not cells.affine:
-        along = (ends[..., 1, :] - ends[..., 0, :]).reshape(-1, 3)
-        corners = _onto_plane(cells, np.repeat(cell, 3), corners.reshape(-1, 3), along).reshape(-1, 3, 3)
+        moved = _onto_plane(cells, np.repeat(cell, 3), corners.reshape(-1, 3), along.reshape(-1, 3))
+        corners = moved.reshape(-1, 3, 3)
     return _Triangles(cell, ends, corners)
 
 

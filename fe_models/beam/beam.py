@@ -24,7 +24,7 @@ from ...mesh.compat import compiled_form, function_space
 from ..link_records.families import Family
 from ..link_records.link import BeamLink
 from .line import R_X, R_Y, R_Z, U_X, U_Y, U_Z, Functions, hermite, lagrange
-from .sections import cellwise, rod_properties, second_moment, shear_modulus
+from .sections import cellwise, rod_properties, shear_modulus
 
 Bending = tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, list[int]]
 """K, M, strains, deflection and rotation at the stations, fixed degrees of freedom."""
@@ -55,9 +55,9 @@ def family_model(link: BeamLink, family: Family, forms: BeamForms, stations: Arr
         fields, fixed = {U_X if family == "axial" else R_X: V.at(stations)}, [0]
     else:
         bending = _timoshenko if link.model.theory == "timoshenko" else _euler_bernoulli
-        K, M, strain, deflection, slope, fixed = bending(link, forms, stations, second_moment(family))
-        # Out of plane, w' is a rotation about −y.
         in_plane = family == "in-plane-bending"
+        K, M, strain, deflection, slope, fixed = bending(link, forms, stations, "I_yy" if in_plane else "I_zz")
+        # Out of plane, w' is a rotation about −y.
         fields = {U_Y: deflection, R_Z: slope} if in_plane else {U_Z: deflection, R_Y: -slope}
     free = np.setdiff1d(np.arange(strain.shape[1]), fixed)
     K, M = (A[free][:, free] for A in (K, M))
@@ -89,17 +89,9 @@ def _timoshenko(link: BeamLink, forms: BeamForms, stations: Array, second_moment
     )
     M = sp.block_diag([forms.matrix(rhoA, W), forms.matrix(rhoI, T)], format="csr")
     strain = sp.bmat([[None, T.root(EI, derivative=1)], [W.root(kGA, derivative=1), -T.root(kGA)]], format="csr")
-    deflection, rotation = W.at(stations), T.at(stations)
-    nothing_w, nothing_t = sp.csr_matrix(deflection.shape), sp.csr_matrix(rotation.shape)
+    read, count = sp.block_diag([W.at(stations), T.at(stations)], format="csr"), len(stations)
     fixed = [0, W.x.size if link.reference.holds_root else W.x.size - 1]
-    return (
-        K,
-        M,
-        strain,
-        sp.hstack([deflection, nothing_t], format="csr"),
-        sp.hstack([nothing_w, rotation], format="csr"),
-        fixed,
-    )
+    return K, M, strain, read[:count], read[count:], fixed
 
 
 class BeamForms:

@@ -23,11 +23,6 @@ def rod_properties(link: BeamLink, family: Family, nodes: Array) -> tuple[Array,
     return modulus * cellwise(link, nodes, stiffness), link.material.density * cellwise(link, nodes, inertia)
 
 
-def second_moment(family: Family) -> str:
-    """Name in `Section` of the second moment of area for bending of that family."""
-    return "I_yy" if family == "in-plane-bending" else "I_zz"
-
-
 def cellwise(link: BeamLink, nodes: Array, name: str) -> Array:
     """Return a property (e,) of `Section`, in its own unit, of each element between `nodes` (e + 1,), m."""
     return section_property(link, 0.5 * (nodes[1:] + nodes[:-1]), name)

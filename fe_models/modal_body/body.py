@@ -268,7 +268,7 @@ def _interfaces(body: ModalBody) -> Iterator[str]:
 
 def _identities(body: ModalBody) -> Iterator[str]:
     squares = (2 * np.pi * body.frequency) ** 2
-    total = body.S_bar_kl[0, 0] + body.S_bar_kl[1, 1] + body.S_bar_kl[2, 2]
+    total = np.trace(body.S_bar_kl)
     identities = [
         ("second_moment", "symmetric", body.second_moment, body.second_moment.T),
         ("stiffness", "diag((2π frequency)²)", body.stiffness, np.diag(squares)),

@@ -166,10 +166,8 @@ class KrylovSchur:
                 one.array[:] = x
             solver.setDeflationSpace(known)
         solver.solve()
-        if solver.getConverged() < count:
-            raise SolveError(
-                f"eigenproblem: {solver.getConverged()} of {count} modes converged to {tolerance:g}: request fewer"
-            )
+        if (found := solver.getConverged()) < count:
+            raise SolveError(f"eigenproblem: {found} of {count} modes converged to {tolerance:g}: request fewer")
         X, theta = np.empty((self._rows, count)), np.empty(count)
         for k in range(count):
             theta[k] = 1.0 / solver.getEigenpair(k, vector).real
@@ -192,8 +190,7 @@ class _Shell:
     def __init__(self, matrix: Product) -> None:
         self._matrix = matrix
 
-    def mult(self, _: PETSc.Mat, x: PETSc.Vec, result: PETSc.Vec) -> None:
+    def mult(self, _: PETSc.Mat | PETSc.PC, x: PETSc.Vec, result: PETSc.Vec) -> None:
         result.array[:] = (self._matrix @ x.array_r[:, None])[:, 0]
 
-    def apply(self, _: PETSc.PC, load: PETSc.Vec, result: PETSc.Vec) -> None:
-        result.array[:] = (self._matrix @ load.array_r[:, None])[:, 0]
+    apply = mult

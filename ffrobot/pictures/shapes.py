@@ -169,8 +169,7 @@ class Shape:
     def placed(self, s: float = 1.0) -> Array:
         """Return positions of the points (T, k, 3), m, global axes, with deflections times s and closed joints."""
         rest = self.body.placed(np.broadcast_to(self.points, (len(self.coordinates), *self.points.shape)))
-        places: Array = rest + s * self.deflection
-        return places if s == 1.0 else places + (s - 1.0) * self.body.shift[:, None]
+        return rest + s * self.deflection + (s - 1.0) * self.body.shift[:, None]
 
 
 def surface_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape:

@@ -11,7 +11,7 @@ from ffrobot.common.validation import validate
 from ffrobot.fe_models.beam.beam import BeamForms, family_model
 from ffrobot.fe_models.beam.line import gram, hermite, lagrange
 from ffrobot.fe_models.beam.modes import lowest_modes
-from ffrobot.fe_models.beam.sections import cellwise, rod_properties, second_moment
+from ffrobot.fe_models.beam.sections import cellwise, rod_properties
 from ffrobot.fe_models.link_records.families import FAMILIES
 from ffrobot.fe_models.link_records.link import BeamLink
 
@@ -43,7 +43,7 @@ def closed_forms(link, family):
     def of(name):
         return cellwise(link, NODES, name)
 
-    W, moment, rhoA = lagrange(NODES, 3), second_moment(family), RHO * of("area")
+    W, moment, rhoA = lagrange(NODES, 3), "I_yy" if family == "in-plane-bending" else "I_zz", RHO * of("area")
     if family in ("axial", "torsion"):
         stiffness, inertia = rod_properties(link, family, NODES)
         return gram(W.root(stiffness, 1)), gram(W.root(inertia))
