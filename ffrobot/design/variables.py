@@ -147,18 +147,18 @@ def parse_variable(text: str) -> DesignVariable:
         keys = _keys(match["keys"])
         return DesignVariable(keys, rows=_rows(match["rows"], len(keys), text))
     name, equals, bounds = text.partition("=")
-    pieces = bounds.split(":")
+    pieces, found = bounds.split(":"), f'"{shown(text)}"'
     try:
         low, high = map(float, pieces[:2])
     except ValueError:
         low = high = np.nan
     logarithmic = len(pieces) == 3 and pieces[2].strip() == "log"
     if not equals or not (len(pieces) == 2 or logarithmic) or not np.isfinite([low, high]).all():
-        raise InputError(f"--vary: expected {FORMS}", f'"{shown(text)}"')
+        raise InputError(f"--vary: expected {FORMS}", found)
     if not low < high:
-        raise InputError("--vary: expected a lower bound and a higher one, LOW:HIGH", f'"{shown(text)}"')
+        raise InputError("--vary: expected a lower bound and a higher one, LOW:HIGH", found)
     if logarithmic and low <= 0.0:
-        raise InputError("--vary: expected bounds above 0 for steps in the logarithm", f'"{shown(text)}"')
+        raise InputError("--vary: expected bounds above 0 for steps in the logarithm", found)
     return DesignVariable(_keys(name), low, high, logarithmic)
 
 

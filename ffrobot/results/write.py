@@ -17,7 +17,7 @@ from ..common.checksum import MARK, sealed
 from ..common.checksum import METHOD as CHECKSUM
 from ..common.files import write_atomically
 from ..common.hdf5 import image_of, in_memory
-from ..common.meanings import write_record
+from ..common.meanings import LABELS, write_record
 from ..common.python_files import allowed_python, imported_files
 from ..common.rotations import quaternions
 from ..common.version import VERSION
@@ -136,7 +136,7 @@ def _write_balances(group: h5py.Group, result: AnalysisResult) -> None:
     group["momentum/linear"] = run.space.along(momentum.linear)
     group["momentum/angular"] = run.space.about(momentum.angular)
     violation = group.create_dataset("constraint_violation", data=constraint_violation(run))
-    violation.attrs["columns"] = ["position", "velocity", "acceleration"]
+    violation.attrs["columns"] = list(LABELS["level"])
 
 
 def _write_forces(group: h5py.Group, solution: Solution, result: AnalysisResult) -> None:
@@ -303,7 +303,7 @@ def _write_stress(group: h5py.Group, stress: BodyStress, outputs: Indices) -> No
         write_record(group.create_group("layers"), recovery.sections)
     for name, point in stress.points.items():
         group[f"points/{name}/stress"] = point.stress[outputs]
-        group[f"points/{name}/stress"].attrs["columns"] = ["xx", "yy", "zz", "yz", "xz", "xy"]
+        group[f"points/{name}/stress"].attrs["columns"] = list(LABELS["stress"])
     if stress.surface is not None:
         group["surface/position_of_max"] = stress.surface.position_of_max[outputs]
 

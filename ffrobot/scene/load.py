@@ -202,16 +202,15 @@ def _check_path(function: TimeFunction, times: Array, label: str) -> None:
 
 
 def _all_duplicates(scene: SceneKeys) -> Iterator[str]:
-    for kind in ("body", "joint", "trajectory", "analysis"):
-        for name, count in Counter(record.name for record in getattr(scene, kind)).items():
+    kinds = ("body", "joint", "trajectory", "analysis")
+    named = [(kind, f"expected one {kind} of this name", [one.name for one in getattr(scene, kind)]) for kind in kinds]
+    layouts, bodies = [layout.label for layout in scene.pzt], [points.body for points in scene.actuation_points]
+    named.append(("pzt", "name: expected a separate name for each layout on a body", layouts))
+    named.append(("actuation_points", "body: expected one table for each body", bodies))
+    for table, expected, names in named:
+        for name, count in Counter(names).items():
             if count > 1:
-                yield f'{kind} "{name}": expected one {kind} of this name, found {count}'
-    for label, count in Counter(layout.label for layout in scene.pzt).items():
-        if count > 1:
-            yield f'pzt "{label}": name: expected a separate name for each layout on a body, found {count}'
-    for name, count in Counter(points.body for points in scene.actuation_points).items():
-        if count > 1:
-            yield f'actuation_points "{name}": body: expected one table for each body, found {count}'
+                yield f'{table} "{name}": {expected}, found {count}'
 
 
 def _reference_problems(scene: SceneKeys) -> Iterator[str]:

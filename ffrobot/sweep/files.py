@@ -53,9 +53,9 @@ def parse_variation(text: str) -> Variation:
     """
     key, equals, values = text.partition("=")
     keys = tuple(tuple(one.strip().split(".")) for one in key.split(","))
-    text = shown(text)
+    text = f'"{shown(text)}"'
     if not equals or not all(map(all, keys)) or max(map(len, keys)) > DEEPEST:
-        raise InputError("--vary: expected KEY=VALUES, such as gravity.1=-9.81:0:5", f'"{text}"')
+        raise InputError("--vary: expected KEY=VALUES, such as gravity.1=-9.81:0:5", text)
     pieces = values.split(":")
     if len(pieces) in (3, 4) and '"' not in values:
         return _range(keys, pieces, text)
@@ -66,7 +66,7 @@ def parse_variation(text: str) -> Variation:
     if not listed:
         raise InputError(
             "--vary: expected FIRST:LAST:COUNT, FIRST:LAST:COUNT:log or a list with commas (texts in quotes)",
-            f'"{text}"',
+            text,
         )
     return Variation(keys, tuple(listed))
 
@@ -76,13 +76,13 @@ def _range(keys: tuple[tuple[str, ...], ...], pieces: Sequence[str], text: str) 
     try:
         first, last, count = float(pieces[0]), float(pieces[1]), int(pieces[2])
     except ValueError:
-        raise InputError("--vary: expected two numbers and a count, FIRST:LAST:COUNT", f'"{text}"') from None
+        raise InputError("--vary: expected two numbers and a count, FIRST:LAST:COUNT", text) from None
     if count < 1 or not np.isfinite([first, last]).all() or (logarithmic and pieces[3] != "log"):
-        raise InputError("--vary: expected FIRST:LAST:COUNT with a count of at least 1, or …:log", f'"{text}"')
+        raise InputError("--vary: expected FIRST:LAST:COUNT with a count of at least 1, or …:log", text)
     if count > MOST_RUNS:
-        raise InputError(f"--vary: expected at most {MOST_RUNS} values", f'"{text}"')
+        raise InputError(f"--vary: expected at most {MOST_RUNS} values", text)
     if logarithmic and not np.sign(first) * np.sign(last) > 0:
-        raise InputError("--vary: expected two ends of one sign for a logarithmic range", f'"{text}"')
+        raise InputError("--vary: expected two ends of one sign for a logarithmic range", text)
     spaced = np.geomspace(first, last, count) if logarithmic else np.linspace(first, last, count)
     return Variation(keys, tuple(float(value) for value in spaced), (first, last), logarithmic)
 
