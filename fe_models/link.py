@@ -266,8 +266,8 @@ def _content(link: Link) -> dict[str, Any]:
 
 
 def _digest(record: Mapping[str, Any]) -> str:
-    content = {"link": record, "fe_models": digest_of_code(Path(__file__).parent), "mesh": digest_of_mesh_code()}
-    return digest_of_content(content)
+    code = {"fe_models": digest_of_code(Path(__file__).parent), "mesh": digest_of_mesh_code()}
+    return digest_of_content({"link": record, **code})
 
 
 def restated(body: ModalBody, link: Link) -> ModalBody | None:

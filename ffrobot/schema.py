@@ -18,7 +18,6 @@ from .common.deferred import RECORD, loaded
 from .common.validation import is_key
 from .mbs.fields.spelling import PLANAR, SPATIAL, NormalInPlane, Spelled
 
-DIALECT = GenerateJsonSchema.schema_dialect
 REF = "#/$defs/"
 REFERENCE = re.compile(r'"#/\$defs/(\w+)"')
 SCENE, IN_PLANE = "Scene", "InPlane"  # names of definitions, and what they end in where planar scenes differ
@@ -43,7 +42,7 @@ def schema(kind: str) -> dict[str, Any]:
 
         described = _for_toml(TypeAdapter(FigureFile).json_schema(schema_generator=_Described))
     title = "3D scene" if kind == SPATIAL else f"{kind} file"
-    return {"$schema": DIALECT, **described, "title": f"ffrobot {title}"}
+    return {"$schema": GenerateJsonSchema.schema_dialect, **described, "title": f"ffrobot {title}"}
 
 
 def scene_in(space: str | None) -> dict[str, Any]:

@@ -32,7 +32,6 @@ _SURFACES = {"TR3": (3, 3), "TR6": (6, 3), "TR7": (7, 3), "QU4": (4, 4), "QU8": 
 _LINES = {"SE2": 2, "SE3": 3, "SE4": 4}
 # MED's nodes in VTK's order: those on faces are those of the lower face, of the four around it, of the upper face.
 _AS_VTK = {"hexahedron27": [*range(20), 24, 22, 21, 23, 20, 25, 26]}
-_WHOLE = "MED_NO_PROFILE_INTERNAL"
 
 
 def read_med(path: Path) -> RawMesh:
@@ -64,7 +63,7 @@ def _mesh(file: h5py.File) -> RawMesh:
     raw = RawMesh(points, dict(of_nodes), remarks=[*_remarks(attributes, step["MAI"])])
     groups = _groups(families.get("ELEME", {}))
     for kind, of in step["MAI"].items():
-        if _text(of.attrs, "PFL") not in ("", _WHOLE):
+        if _text(of.attrs, "PFL") not in ("", "MED_NO_PROFILE_INTERNAL"):
             raise InputError(f"expected all cells of type {kind}", "a profile of some")
         if kind in _SOLIDS:
             width, name = _SOLIDS[kind]

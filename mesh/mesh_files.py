@@ -37,7 +37,6 @@ _VOXEL = [0, 1, 3, 2, 4, 5, 7, 6]  # corners of VTK's voxel, which are in order 
 _TECPLOT = re.compile(rb"^\s*ZONE\b", re.MULTILINE | re.IGNORECASE)  # other files with the ending .dat are Nastran's
 # VTK's types of cells that are neither solids nor their faces, which may stand beside solids.
 _VTK_TYPES = {2: "sets of points", 4: "polylines", 6: "strips of triangles", 7: "polygons"}
-_LEFT_OUT = "cells that meshio cannot handle"
 _ENDINGS = (".step", ".stp", ".msh", ".inp", ".bdf", ".nas", ".fem", ".dat", ".vtk", ".vtu", ".med", ".xdmf", ".mesh")
 # Integer data of cells with more values than this number cells, not groups.
 _MOST_GROUPS = 1000
@@ -103,7 +102,7 @@ def _read(path: Path, said: io.StringIO) -> meshio.Mesh:
 
     try:
         mesh = meshio.read(path)
-        if _LEFT_OUT in said.getvalue():
+        if "cells that meshio cannot handle" in said.getvalue():
             raise ValueError("cells of other types")
         return mesh
     except (Exception, SystemExit):

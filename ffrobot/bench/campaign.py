@@ -11,7 +11,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from matplotlib.figure import Figure
 from rich.console import Console
 
 from ..common.files import check_folder, write_atomically
@@ -167,8 +166,6 @@ def inputs_of(scene: Scene, bodies: Mapping[str, str]) -> dict[str, object]:
 Rows = Sequence[Mapping[str, Any]]
 Curves = Mapping[str, tuple[Sequence[float], Sequence[float]]]
 
-TIME = "seconds_min"
-
 MOST_TICKS = 6  # at the points themselves
 
 
@@ -177,7 +174,7 @@ def draw_work_precision(groups: Mapping[str, Rows], title: str, folder: Path) ->
     written: list[Path] = []
     time, error = "least run time (s)", "error / peak"
     for kind in KINDS:
-        curves = {name: points_of(rows, TIME, f"error_{kind}") for name, rows in groups.items()}
+        curves = {name: points_of(rows, "seconds_min", f"error_{kind}") for name, rows in groups.items()}
         written += draw(curves, f"{title}: {kind}", time, error, folder, f"work_precision_{kind}")
     return written
 
@@ -199,7 +196,6 @@ def draw(curves: Curves, title: str, x_label: str, y_label: str, folder: Path, n
     if not shown:
         return []
     with style():
-        picture: Figure
         picture, axes = new_axes(title)
         axes.set_xscale("log")
         axes.set_yscale("log")

@@ -277,15 +277,13 @@ def evolve(evaluations: Evaluations, seed: int, start: Place | None, tell: Calla
         failed = np.full(len(problem.responses), np.inf)
         return np.column_stack([problem.scaled(one.values) if one.completed else failed for one in designs])
 
-    def on_improvement(x: Array, convergence: float) -> None:
-        tell(f"differential evolution, {evaluations.designs.count} runs")
-
     limits = (NonlinearConstraint(lambda places: values(places)[1:], -np.inf, 0.0),) if problem.limits else ()
     with suppress(SpentError), np.errstate(invalid="ignore"):
         done = differential_evolution(
             lambda places: values(places)[0], [(0.0, variable.top) for variable in space.variables],
             popsize=max(POPULATION, -(-SMALLEST // count)), maxiter=GENERATIONS, tol=SPREAD, seed=seed, polish=False,
-            updating="deferred", vectorized=True, constraints=limits, x0=start, callback=on_improvement,
+            updating="deferred", vectorized=True, constraints=limits, x0=start,
+            callback=lambda x, convergence: tell(f"differential evolution, {evaluations.designs.count} runs"),
             integrality=[variable.is_catalogue for variable in space.variables],
         )  # fmt: skip
         return "" if done.success else f"differential evolution: {done.message}"

@@ -87,7 +87,6 @@ def _checked(function: Callable[P, R]) -> Callable[P, R]:
 
 
 Responses = Annotated[Sequence[str], "RESPONSE"]
-Spreads = Annotated[Sequence[str], "KEY=SPREAD"]
 Ranges = Annotated[Sequence[str], "KEY=LOW:HIGH"]
 Limits = Annotated[Sequence[str], '"RESPONSE <= NUMBER"']
 MostRuns = Annotated[int, IntRange(1, 100_000)]
@@ -246,7 +245,7 @@ def trade_off(
 def uncertainty(
     scene: AnyPath,
     of: Annotated[Sequence[str], "RESPONSE|HISTORY"],
-    spread: Spreads,
+    spread: Annotated[Sequence[str], "KEY=SPREAD"],
     output: AnyPath | None = None,
     *,
     samples: Annotated[int, "N"] = 200,

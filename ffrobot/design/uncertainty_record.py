@@ -14,7 +14,6 @@ from .spreads import NAMES, Indices, Spread, SpreadStatistics
 
 LinearOrSampled = Literal["samples", "gradients"]
 ROUND_OFF = 1e-13  # of a response: smaller deviations are none
-UNCHANGED = "none of the keys changes it"
 LINEAR = 0.9  # of a variance: below, a note says that shares by regression are small
 BAND_HEADINGS = ("history", "unit", "deviation, at most", "at t = (s)", "widest 5 % to 95 %", "at t = (s)")
 WORST = {"samples": "lowest and highest sample", "gradients": "keys at their worse ends (linear)"}
@@ -129,7 +128,7 @@ class Uncertainty(Finding):
         """Notes on the accuracy, failed runs, and the method."""
         for g, (response, reading) in enumerate(self.readings.items()):
             if self.statistics.deviation[g] <= ROUND_OFF * abs(reading.value):
-                yield f"note       {response}: {UNCHANGED}"
+                yield f"note       {response}: none of the keys changes it"
             if (linear := self.explained[g]) < LINEAR and self.indices is None:
                 yield (
                     f"note       {response}: linear effects of keys make up {100 * linear:.0f} % of the variance:"

@@ -29,7 +29,6 @@ class _FileName(click.Path):
 
 # Shared by all commands: click looks for a translation of each type's name.
 FILE = _FileName(path_type=Path)
-_THERE = click.Path(path_type=Path, exists=True)
 _LOG = click.Path(dir_okay=False, writable=True, path_type=Path)
 
 F = TypeVar("F", bound=Callable[..., object])
@@ -62,7 +61,7 @@ python_option = click.option(
     "--allow-python",
     metavar="PATH",
     multiple=True,
-    type=_THERE,
+    type=click.Path(path_type=Path, exists=True),
     expose_value=False,
     callback=_allow_python,
     help="Run Python files that the scene names from here too [its own folder]; repeatable.",

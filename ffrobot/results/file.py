@@ -54,9 +54,6 @@ def status_in_words(attributes: Mapping[str, Any]) -> str:
     return f"{status}, {count} warning{'s' if count > 1 else ''}" if count else str(status)
 
 
-NUMBER = re.compile(r"(\d+)")
-
-
 def dataset_and_column(name: str) -> tuple[str, int | None]:
     """Split `name[k]` into dataset and number of its column; None without a column."""
     match = re.fullmatch(r"(.*?)\[(\d+)\]", name)
@@ -367,7 +364,7 @@ class Results:
             yield self.path
             return
         with TemporaryDirectory() as folder:
-            yield self.save(Path(folder) / f"{Path(self.path).stem.strip('<>').replace(' ', '_')}.results.h5")
+            yield self.save(Path(folder) / f"{self.path.stem.strip('<>').replace(' ', '_')}.results.h5")
 
     def attributes(self, group: str) -> Mapping[str, Any]:
         """Attributes of an analysis or of one of its groups, such as `inverse/pzt/link1`.
@@ -458,4 +455,4 @@ class Results:
 
 def _natural(name: str) -> list[str | int]:
     """What sorts names as people do: text and whole numbers in turn."""
-    return [int(part) if part.isdecimal() else part for part in NUMBER.split(name)]
+    return [int(part) if part.isdecimal() else part for part in re.split(r"(\d+)", name)]

@@ -159,7 +159,6 @@ def write_tracking(group: h5py.Group, run: Run, tracked: TrackedPath) -> None:
     objective per unit of each limit.
     """
     group = group.create_group("tracking")
-    about = group.attrs
     write_record(group, tracked)
     for kind, prices in tracked.prices.items():
         for name, values in prices.items():
@@ -177,8 +176,8 @@ def write_tracking(group: h5py.Group, run: Run, tracked: TrackedPath) -> None:
     for body, F_p in forces.modal.items():
         patches = patches + (F_p * body_motion(run, body).modal_velocity).sum(axis=1)
     for name, power in (("motor", motors), ("patch", patches)):
-        about[f"{name}_work"] = float(np.diff(run.time) @ (power[1:] + power[:-1]) / 2)
-        about[f"{name}_power"] = float(np.abs(power).max(initial=0.0))
+        group.attrs[f"{name}_work"] = float(np.diff(run.time) @ (power[1:] + power[:-1]) / 2)
+        group.attrs[f"{name}_power"] = float(np.abs(power).max(initial=0.0))
 
 
 def read_motors(group: h5py.Group, joints: Sequence[str]) -> dict[str, MotorFeasibility]:

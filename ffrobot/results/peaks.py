@@ -18,8 +18,6 @@ if TYPE_CHECKING:  # reading can do without the core
     from ..mbs.joints.joint import JointRecord
     from ..run.result import AnalysisResult
 
-VOLTAGE = "pzt/*/voltage"
-
 POWER = "peak_power"
 """Attribute of a joint with one coordinate: the largest power of its motor, W."""
 MEAN_POWER, RMS_POWER = "mean_power", "rms_power"
@@ -105,7 +103,7 @@ def write_peaks(group: h5py.Group, time: Array, histories: Mapping[str, Array], 
             columns = values.reshape(len(time), -1)
             columns = np.linalg.norm(columns, axis=1, keepdims=True) if _is_vector(name) else columns
             tops = np.array([largest(time, column) for column in columns.T])
-            if matches(name, VOLTAGE):  # cut off at its limit, it has no smooth top there
+            if matches(name, "pzt/*/voltage"):  # cut off at its limit, it has no smooth top there
                 limit = dataset.parent.attrs.get("limit", np.inf)
                 tops[:, 0] = np.minimum(tops[:, 0], np.maximum(np.abs(columns).max(axis=0), limit))
             means = {"rms": np.sqrt(weights @ columns**2), "mean": weights @ columns}

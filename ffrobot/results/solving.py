@@ -99,13 +99,9 @@ def how_to_go_on(solution: Solution, command: str) -> str:
     return f'; {command} runs "{outcome.analysis.name}" again from its start'
 
 
-MAY_CHANGE = "max_steps"  # counts from where a run goes on
-
-
 def check_same_input(scene: Scene, bodies: Mapping[str, LoadedBody], file: Results) -> None:
     """Raise `InputError` naming the first part of scene, bodies or input files that differs from that of `file`."""
-    change = next(_changes(scene, bodies, file), None)
-    if change is not None:
+    for change in _changes(scene, bodies, file):
         raise InputError(
             f"{file.path}: resume: expected results of the same input",
             f"that {change} has changed; solve it from the start, or undo the change",
@@ -134,7 +130,8 @@ def _changes(scene: Scene, bodies: Mapping[str, LoadedBody], file: Results) -> I
 
 
 def _without_limits(scene: Mapping[str, Any]) -> dict[str, Any]:
-    analyses = [{key: value for key, value in a.items() if key != MAY_CHANGE} for a in scene["analysis"]]
+    # `max_steps` counts from where a run goes on.
+    analyses = [{key: value for key, value in a.items() if key != "max_steps"} for a in scene["analysis"]]
     return {**scene, "analysis": analyses}
 
 

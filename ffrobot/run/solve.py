@@ -124,8 +124,7 @@ def _with_enough_pieces(solution: Solution, interruption: Interruption) -> Solut
     """The scene solved again with links in as many pieces as they bend far, those of `pieces = "auto"`."""
     given = {body.name: body.pieces for body in solution.scene.body if isinstance(body.pieces, int)}
     while solution.failure is None and not interruption.requested:
-        more = wanted_pieces(solution, list(solution.outcomes.values()))
-        if not more:
+        if not (more := wanted_pieces(solution, list(solution.outcomes.values()))):
             break
         solution = _completed(with_pieces(solution, given | more, interruption.watcher), interruption)
     return solution

@@ -130,7 +130,8 @@ def run_sweep(sweep: Sweep, batch: Batch, watcher: Watcher) -> list[Row]:
     def tabulate() -> None:
         nonlocal asked
         known = [*sweep.earlier, *(rows[k] for k in sorted(rows))]
-        if asked and (first := next((run for run in sweep.runs if _is_completed(rows.get(run.number))), None)):
+        done = (run for run in sweep.runs if run.number in rows and rows[run.number].status == "completed")
+        if asked and (first := next(done, None)):
             for line in missing_columns(rows[first.number], asked, first.folder / RESULTS):
                 warnings.warn(line, FfrobotWarning, stacklevel=1)
             asked = ()
@@ -165,10 +166,6 @@ def run_sweep(sweep: Sweep, batch: Batch, watcher: Watcher) -> list[Row]:
         if rows:
             tabulate()
     return [rows[k] for k in sorted(rows)]
-
-
-def _is_completed(row: Row | None) -> bool:
-    return row is not None and row.status == "completed"
 
 
 def stale_rows(sweep: Sweep) -> str:
@@ -265,7 +262,8 @@ def print_table(sweep: Sweep, rows: Sequence[Row], console: Console) -> None:
     quantities = [name for name in _quantities(rows) if not name.endswith((" steps", " wall_seconds"))]
     shown = [name for name in quantities if name in asked] if asked else quantities[:SHOWN]
     own = ["run", *sweep.keys, "status"]
-    while len(shown) > 1 and sum(_width(header) + GAP for header in (*own, *shown)) > console.width:
+    widths = [max([8, *map(len, _broken(header).splitlines())]) + GAP for header in (*own, *shown)]
+    while len(shown) > 1 and sum(widths[: len(own) + len(shown)]) > console.width:
         shown = shown[:-1]
     cells = (
         (str(row.number), *map(number, row.values), row.status,
@@ -287,10 +285,6 @@ def number(value: object) -> str:
 
 def _broken(header: str) -> str:
     return header.replace("/", "/\n").replace(" ", "\n")
-
-
-def _width(header: str) -> int:
-    return max([8, *(len(line) for line in _broken(header).splitlines())])
 
 
 def _quantities(rows: Sequence[Row]) -> list[str]:
