@@ -26,7 +26,6 @@ _SIDES: dict[str, list[tuple[int, ...]]] = {
     "tetra": [(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)],
     "hexahedron": [(0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)],
 }
-_SIDE = re.compile(r"S([1-6])")
 # Nodes of tied surfaces closer than this, relative to the part, are one.
 _COINCIDENT = 1e-5
 
@@ -229,4 +228,4 @@ class _Assembled:
 
 
 def _side(row: Sequence[str]) -> re.Match[str] | None:
-    return _SIDE.fullmatch(row[1].upper()) if len(row) > 1 else None
+    return re.fullmatch(r"S([1-6])", row[1].upper()) if len(row) > 1 else None
