@@ -1,7 +1,5 @@
 """A robot as x' = A x + B u, y = C x + D u, its modes, and files of such models."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from functools import cached_property
@@ -67,7 +65,7 @@ class StateSpace:
         """Write the model to a .npz or .mat file. Raises `InputError` for another suffix."""
         save_arrays(self.arrays(), path)
 
-    def to_control(self, inputs: Names | None = None, outputs: Names | None = None) -> control.StateSpace:
+    def to_control(self, inputs: Names | None = None, outputs: Names | None = None) -> "control.StateSpace":
         """Return a state-space model of python-control (extra "control"), with ":" instead of "." in names.
 
         From `inputs` to `outputs` by name, in that order; None: all. A sampled model has `step` as dt. Raises

@@ -4,8 +4,6 @@ Explicit steps are limited by the highest frequency whether it is excited or not
 rings above the tolerance. The rule estimates the number of steps of both; a wrong one is found out in the run.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import NamedTuple
 
@@ -91,7 +89,7 @@ class Choice(NamedTuple):
         last, _, before = self.name.partition(AFTER)
         return f"{before}, then {last}" if before else last
 
-    def changed_in(self, run: _core.TreeRun) -> Choice:
+    def changed_in(self, run: _core.TreeRun) -> "Choice":
         """Return the choice with the changes of integrators during `run` in its name and reason."""
         if not run.changes:
             return self
@@ -223,7 +221,7 @@ def choose_integrator(
     analysis: IntegratedAnalysis,
     start: State,
     times: Array,
-    stiffness: Stiffness,
+    stiffness: "Stiffness",
     *,
     is_sampled: bool,
 ) -> Choice:

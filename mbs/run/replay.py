@@ -4,8 +4,6 @@ Steps that were recorded are made again, stage by stage where another run has th
 solved anew.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -67,7 +65,9 @@ def _reached(model: Model, to_reached: Mapping[str, Array]) -> tuple[int, Array]
     return first, reached
 
 
-def functions_within(curve: PPoly, least: Array | float = -np.inf, most: Array | float = np.inf) -> list[TimeFunction]:
+def functions_within(
+    curve: "PPoly", least: Array | float = -np.inf, most: Array | float = np.inf
+) -> list[TimeFunction]:
     """The k components of a `curve` as functions of time, constant before and after it.
 
     Cut to `least` … `most` in the curve's unit; linear in parts of its pieces where these limits act.
