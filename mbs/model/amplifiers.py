@@ -14,7 +14,6 @@ from dataclasses import fields, replace
 import numpy as np
 
 from ...common.arrays import Array
-from ...common.libraries import scipy
 from ...common.structs import struct
 
 MOST_PLAYS = 32
@@ -171,5 +170,9 @@ def joined(links: Iterable[Amplifiers]) -> Amplifiers:
     none |= {"range": np.zeros((2, 0)), "plays": np.zeros((2, MOST_PLAYS, 0)), "capacitance": np.zeros((0, 0))}
     parts = [none, *map(vars, links)]
     found = {key: [of[key] for of in parts] for key in none}
-    C = scipy.linalg.block_diag(*found.pop("capacitance"))
+    blocks = found.pop("capacitance")
+    ends = np.cumsum([len(block) for block in blocks])
+    C = np.zeros((ends[-1], ends[-1]))
+    for block, end in zip(blocks, ends.tolist(), strict=True):
+        C[end - len(block) : end, end - len(block) : end] = block
     return Amplifiers(capacitance=C, **{key: np.concatenate(of, axis=-1) for key, of in found.items()})
