@@ -139,7 +139,7 @@ def side(layout: PztLayout) -> float:
 
 
 def bending_row(layout: PztLayout) -> int:
-    """Return the index in e of the curvature towards the patches' normal."""
+    """Return the index, in the four strains of a section, of the curvature towards the patches' normal."""
     return BEND_Y if layout.normal == "y" else BEND_Z
 
 

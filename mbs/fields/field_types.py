@@ -71,7 +71,7 @@ T = TypeVar("T")
 
 
 def split_point(reference: str, also: str = "") -> tuple[str, str]:
-    """Split `"link1.tip"` into `("link1", "tip")`. Raises `ValueError` when it is not of the form BODY.POINT."""
+    """Split `"link1.tip"` into `("link1", "tip")`. Raises `ValueError` for others, with `also` in its text."""
     body, dot, point = reference.partition(".")
     if not (body and dot and point) or "." in point:
         raise ValueError(f'expected {also}a point as "BODY.POINT", found "{shown(reference)}"')

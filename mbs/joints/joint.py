@@ -254,7 +254,7 @@ class JointRecord(Record):
         return -coordinates
 
     def rate_turned_around(self, coordinates: Array, rate: Array) -> Array:
-        """Return the rate (…, k), rad/s or m/s, of `turned_around(coordinates)` by the `rate` of `coordinates`."""
+        """Return rates (…, k), rad/s or m/s, of coordinates of the first side in the second, by those of the joint."""
         return self.turned_around(rate)
 
     def state(self, coordinates: Array) -> Array:

@@ -169,7 +169,7 @@ class SphericalJoint(JointRecord):
         return quaternions(exponential(coordinates))
 
     def velocity(self, rates: Array) -> Array:
-        """Return the angular velocity (3,), rad/s, in axes of the second side."""
+        """Return the angular velocity (3,), rad/s, in axes of the second body, by `rates` in those of the joint."""
         return self.orientation @ rates
 
 

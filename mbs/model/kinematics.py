@@ -128,7 +128,10 @@ def moves(node: Node) -> bool:
 
 
 def rows_of(body: Body, section: Section) -> tuple[Array, Array, list[Array]]:
-    """Return Φ over Φ_r (6, n), 1/√kg, 1/(√kg·m), position (3,), m, of a section, six `Stiffening.K_points` or none."""
+    """Return translations Φ over rotations Φ_r (6, n), 1/√kg, 1/(√kg·m), and the position (3,), m, of a section.
+
+    Third are its six `Stiffening.K_points` (n, n), 1/(kg·m) and 1/(kg·m²), or none.
+    """
     if not section.point:
         return np.zeros((6, body.n_modes)), np.zeros(3), []
     at = body.points[section.point]

@@ -126,7 +126,7 @@ class Model:
 
     @cached_property
     def along_cut(self) -> AlongCut:
-        """Measurement of the coordinates `cut`."""
+        """Values and rates of joint coordinates at which loops are cut, by states of the tree."""
         return AlongCut(self.tree, self.cut)
 
     @cached_property

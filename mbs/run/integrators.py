@@ -151,10 +151,10 @@ def faster_of(
 
 
 def beyond_round_off(tolerance: float, run: _core.TreeRun, of_gears: float) -> str:
-    """A warning where relative round-off of `run`, or `of_gears`, exceeds the tolerance; else "".
+    """A warning where relative round-off of `run`, or `of_gears` in torques behind gears, exceeds the tolerance.
 
     Near singular postures, constraint equations determine forces only to double precision over r², where r is the
-    least ratio of singular values of postures.
+    least ratio of singular values of these equations in the run. "" where nothing exceeds it.
     """
     of_posture = float(np.finfo(float).eps) / run.least_ratio**2 if run.least_ratio > 0.0 else 0.0
     if not (round_off := max(run.rounding, of_posture, of_gears)) > tolerance:

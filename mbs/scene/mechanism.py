@@ -71,7 +71,7 @@ class Initial(Referring):
         return self._named.get(table, frozenset(getattr(self, table)))
 
     def naming(self, **named: frozenset[str]) -> Self:
-        """Return a copy whose `named(table)` is `named[table]`, even if other joints have values, too."""
+        """Return a copy that counts only joints `named`, by table, as given in the file, though others have values."""
         copy = self.model_copy()
         copy._named = named
         return copy
