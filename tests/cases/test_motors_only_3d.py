@@ -70,16 +70,18 @@ def test_leaning_arm_keeps_to_its_line(solved):
 
 
 def test_an_arm_that_starts_next_to_a_singular_posture_is_told_so():
-    """Undeformed it reaches its start, nearly stretched; bent links need postures beyond the reach of its joints."""
+    """Undeformed it reaches its start, nearly stretched; bent links need postures beyond the reach of its joints.
+
+    Round-off decides which of two causes is met first.
+    """
     link = beam_link(0.4, rectangle(0.012, 0.02), 8, modes={"count": 2, "family": "in-plane-bending"})
     path = {"name": "tip", "point": "b.tip", "x": f"0.8*cos(5e-4) - 0.05*({S})", "y": f"0.1*({S})"}
     tables = planar(
         [{"name": name, "link": link} for name in "ab"], [pin("O", "ground", "a.root"), pin("A", "a.tip", "b.root")],
         EXACT, gravity=(0.0, 0.0), trajectory=[path], initial={"joints": {"O": -5e-4, "A": 1e-3}},
     )  # fmt: skip
-    with pytest.raises(
-        ffrobot.SolveError, match=r"at t = [\d.]+ s: at t = 0 s nearly a singular posture.*Move the path"
-    ):
+    causes = "at t = 0 s nearly a singular posture.*Move the path", "singular coupling between t = 0 and"
+    with pytest.raises(ffrobot.SolveError, match="|".join(causes)):
         ffrobot.solve(ffrobot.make_scene(**tables))
 
 
