@@ -281,8 +281,7 @@ def _straight(placed: PlacedLayout, body: ModalBody) -> Effects:
     starts, ends, stations, first = _stretches(layout, body, sections, edges)
     alike, which = np.unique(sections.alike[stations], return_inverse=True)
     places = np.array([place_of(layout, sections, station) for station in alike.tolist()])
-    felt = np.isin(np.arange(4), felt_rows(layout))
-    loads = np.array([felt * layer_loads(layout, *place)[1] for place in places])
+    loads = np.array([felt_loads(layout, sections, station)[2] for station in alike.tolist()])
     before, after = np.split(potentials(body, np.concatenate([starts, ends])), 2)
     differences = after - before
     of_stretch = np.stack([places[:, 0], loads[:, own], places[:, 1]])[:, which]
