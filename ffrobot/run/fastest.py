@@ -173,9 +173,10 @@ def with_paths(scene: Scene, model: Model, judge: Judge, stage: Callable[[str], 
             f, ratio = frequencies.frequency[:, : shaper.modes], shaper.damping_ratio
             ranges = (f"{one.mean():.4g} Hz ({one.min():.4g} to {one.max():.4g} along the path)" for one in f.T)
             notes.append(f"{name}: {shaper.kind} shaper for {', '.join(ranges)}")
-            mean = float(frequencies.damping_ratio[:, : shaper.modes].mean())
-            damping_ratio, frequency = mean if ratio is None else ratio, tuple(f.mean(axis=0).tolist())
-            shapers[name] = Shaper(kind=shaper.kind, frequency=frequency, damping_ratio=damping_ratio)
+            if ratio is None:
+                ratio = tuple(frequencies.damping_ratio[:, : shaper.modes].mean(axis=0).tolist())
+            frequency = tuple(f.mean(axis=0).tolist())
+            shapers[name] = Shaper(kind=shaper.kind, frequency=frequency, damping_ratio=ratio)
         changed = [one.changed(shaper=shapers[one.name]) if one.name in shapers else one for one in scene.trajectory]
         scene = scene.model_copy(update={"trajectory": tuple(changed)})
     if any(trajectory.fastest for trajectory in scene.trajectory):

@@ -145,11 +145,11 @@ class _Search:
 
     def _shaped(self, values: Array) -> Iterator[tuple[str, Array]]:
         """By each kind of shaper, of the lowest frequency, and of the two lowest."""
-        ratio = float(np.mean([one.ratio[0] for one in self.modes]))
+        ratios = np.mean([one.ratio[: len(self.periods)] for one in self.modes], axis=0).clip(max=0.9).tolist()
         for kind, count in product(SHAPERS, range(1, min(2, len(self.periods)) + 1)):
             shaped = values
-            for period in self.periods[:count]:
-                sequence = impulses(kind, 1 / period, min(ratio, 0.9))
+            for period, ratio in zip(self.periods[:count], ratios[:count], strict=True):
+                sequence = impulses(kind, 1 / period, ratio)
                 last = int(np.ceil(sequence[-1].delay / self.step))
                 rows = np.arange(len(shaped) + last, dtype=float)
                 lines = interpolated(rows[: len(shaped)], shaped, 1)

@@ -40,6 +40,9 @@ LIMITS = ("speed", "acceleration", "jerk")
 OF_LEGS = ("hold", "blend", "duration", *LIMITS, "start", "stretch", "fastest")  # a table of waypoints has its times
 
 
+Ratio = Annotated[float, Field(ge=0.0, lt=1.0)]
+
+
 class Shaper(Record):
     """Input shaping: delayed shares of the motion cancel their vibrations (Singer and Seering 1990).
 
@@ -49,10 +52,10 @@ class Shaper(Record):
     kind: Literal["none", "zv", "zvd", "ei"]
     """Shaper: "zv" is shortest, "zvd" and "ei" take twice as long and are robust against a wrong frequency; "none" does
     nothing."""
-    frequency: Positive | tuple[Positive, ...] | None = None
+    frequency: Positive | Annotated[tuple[Positive, ...], Field(min_length=1)] | None = None
     """Frequencies of the vibrations, Hz: one or several; by default those of the robot."""
-    damping_ratio: Annotated[float, Field(ge=0.0, lt=1.0)] | None = None
-    """Damping ratio of these vibrations; by default the mean of the robot's, and 0 with `frequency`."""
+    damping_ratio: Ratio | tuple[Ratio, ...] | None = None
+    """Damping ratio of these vibrations: one for all, or one each; by default the robot's, and 0 with `frequency`."""
     modes: Annotated[int, Field(gt=0, le=4)] = 1
     """Number of the robot's lowest vibrations."""
 
@@ -60,14 +63,17 @@ class Shaper(Record):
     def _consistent(self) -> Self:
         if self.frequency is not None and "modes" in self.model_fields_set:
             raise ValueError('expected one of the keys "frequency" and "modes", found both')
+        number = self.modes if self.frequency is None else np.size(self.frequency)
+        if isinstance(self.damping_ratio, tuple) and len(self.damping_ratio) != number:
+            raise ValueError(f"damping_ratio: expected one value, or {number}, found {len(self.damping_ratio)}")
         return self
 
     def shape(self, motion: Piecewise) -> Piecewise:
         """Return the motion shaped for each frequency; unchanged without `frequency`."""
         if self.kind == "none" or self.frequency is None:
             return motion
-        for frequency in np.atleast_1d(self.frequency):
-            motion = shaped(motion, impulses(self.kind, float(frequency), self.damping_ratio or 0.0))
+        for frequency, ratio in np.broadcast(self.frequency, self.damping_ratio or 0.0):
+            motion = shaped(motion, impulses(self.kind, frequency, ratio))
         return motion
 
 

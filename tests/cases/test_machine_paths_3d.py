@@ -85,19 +85,25 @@ def test_least_stretch_is_found_from_both_sides(limit):
 
 
 def test_shapers_know_the_robot():
-    """With its joint held the arm is a cantilever: 1.8751² √(EI/ρA)/(2π L²) of its weaker plane, out of the swing."""
+    """With its joint held the arm is a cantilever: 1.8751² √(EI/ρA)/(2π L²) of its weaker plane, out of the swing.
+
+    Its damping ratios πbf differ, and the shaper of each takes its own period, 1/(f √(1 − (πbf)²)).
+    """
     link = beam_link(
         0.8,
         rectangle(4e-3, 3e-3),
         12,
         modes={"count": 3, "family": ["in-plane-bending", "out-of-plane-bending"], "attachment_modes": False},
-        damping={"ratio": 0.005},
+        damping={"rayleigh": [0.0, 0.01]},
     )
     found = ffrobot.solve(
         arm({"duration": 0.5, "shaper": {"kind": "zvd", "modes": 2}}, body={"name": "arm", "link": link})
     )
     exact = [1.8751041**2 * np.sqrt(70e9 * h**2 / 12 / 2700.0) / (2 * np.pi * 0.8**2) for h in (3e-3, 4e-3)]
-    assert found.attributes("inverse/trajectories/swing")["shaper_frequency"] == pytest.approx(exact, rel=1e-4)
+    about = found.attributes("inverse/trajectories/swing")
+    f = about["shaper_frequency"]
+    assert f == pytest.approx(exact, rel=1e-4)
+    assert about["end"] == pytest.approx(0.5 + np.sum(1 / (f * np.sqrt(1 - (0.01 * np.pi * f) ** 2))), rel=1e-9)
 
 
 GEAR = {"gear_ratio": 50.0, "rotor_inertia": 2e-5, "stiffness": 400.0, "damping": 0.5}

@@ -287,6 +287,7 @@ MOTION_MISTAKES = [
     (f"{VIA}\nduration = 1.0\nfastest = true\nstretch = 2.0", 'expected one of the keys "fastest" and "stretch"'),
     (f'{VIA}\nduration = 1.0\nshaper = {{ kind = "zv", frequency = 0.0 }}', "shaper.frequency"),
     (f'{VIA}\nduration = 1.0\nshaper = {{ kind = "zv", frequency = 1.0, modes = 2 }}', '"frequency" and "modes"'),
+    (f'{VIA}\nduration = 1.0\nshaper = {{ kind = "zv", damping_ratio = [0.1, 0.2] }}', "one value, or 1, found 2"),
 ]
 
 
