@@ -224,18 +224,18 @@ def _coordinates(model: Model) -> tuple[list[str], Array]:
 def _independent(model: Model, q: Array) -> Indices:
     """Where s is in v: motors first, then other joints, then modes."""
     modes = np.flatnonzero(~model.tree.joint_columns)
-    motors = model.motor_columns
-    others = np.setdiff1d(np.flatnonzero(model.tree.joint_columns), motors)
+    motors, geared = model.motor_columns, [gear.joint.v.start for gear in model.tree.gears]
+    others = np.setdiff1d(np.flatnonzero(model.tree.joint_columns), [*motors, *geared])
     (left,) = model.constraints.natural_gradients(q[None], np.zeros(1), model.natural_sizes)
     size, free = np.abs(left).max(initial=0.0), []
-    for group in (others, motors, modes):  # what loops determine best is dependent, motors and modes last
+    for group in (others, np.array(geared, int), motors, modes):  # what loops determine best is dependent, modes last
         rank, order = 0, np.arange(len(group))
         if len(left) and len(group):
             Q, R, order = scipy.linalg.qr(left[:, group], pivoting=True)
             rank = int(np.count_nonzero(np.abs(np.diag(R)) > DEPENDENT * size))
             left = Q[:, rank:].T @ left
-        free.append(np.sort(group[order[rank:]]))
-    return np.concatenate([free[1], free[0], free[2]]).astype(np.intp)
+        free.append(group[order[rank:]])
+    return np.concatenate([*map(np.sort, (free[2], np.append(*free[:2]), free[3]))]).astype(np.intp)
 
 
 def _bracket(nodes: Sequence[Node], v: Array) -> Array:

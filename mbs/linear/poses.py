@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from ...common.arrays import Array
-from ...common.errors import SolveError
+from ...common.errors import InputError, SolveError, quoted
 from ..model.gears import with_compliance
 from ..model.known_motion import State
 from ..model.model import Model
@@ -63,6 +63,11 @@ class PoseEvaluator:
         shafts = [name for name in self._linear.names if name.startswith("motor/")]
         driven = {name for joint in self.model.motors for name, _ in labelled(self.model, joint)}
         direct = [name for name in self._linear.names if name in driven]
+        if len(direct) < len(driven):
+            raise InputError(
+                f"{model.scene.path}: joint: expected no more motors than the mechanism has degrees of freedom",
+                f"{len(driven)} ({quoted(model.motors)})",
+            )
         geared = [name.replace("motor/", "joint/") for name in shafts]
         self.motors = (*(name for name in direct if name not in geared), *shafts)
         tree, segments = self.model.tree, list[tuple[Section, Section]]()

@@ -265,6 +265,28 @@ def test_names_with_blanks_and_limits_of_each_coordinate(tmp_path):
     np.testing.assert_allclose(found.values["torque_share"].T, [0 * third, second / 5.0, third / 3.0], atol=1e-9)
 
 
+def five_bar(order, third=False):
+    """Two cranks of 0.3 m on the ground, 0.4 m apart, with compliant gears, and rods of 0.5 m that meet above."""
+    bodies = [two_dimensional(name, 1.0, 0.02, L) for name, L in (("a", 0.3), ("b", 0.5), ("c", 0.3), ("d", 0.5))]
+    geared = {"motor": True, "stiffness": 500.0, "rotor_inertia": 1e-3}
+    joints = [pin("A", "ground", "a.root", **geared), pin("C", "ground", "c.root", at=[0.4, 0.0], **geared)]
+    joints += [pin("B", "a.tip", "b.root", motor=third), pin("D", "c.tip", "d.root"), pin("E", "b.tip", "d.tip")]
+    start = {"joints": {"A": 2.0, "C": 1.2, "B": -1.1, "D": 1.1, "E": 1.4}}
+    return planar(bodies, [joints[k] for k in order], REST, initial=start)
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2, 3, 4), (4, 3, 2, 1, 0)])
+def test_manipulability_of_a_loop_behind_gears(tmp_path, order):
+    """Rods keep their lengths: u·v = u·v of the crank's end along each rod u, whatever joint comes first."""
+    found = mapped(written(tmp_path, five_bar(order)), tmp_path / "map", "A=2.0", "C=1.2", point="b.tip")
+    ends = np.array([[0.3 * np.cos(2.0), 0.3 * np.sin(2.0)], [0.4 + 0.3 * np.cos(1.2), 0.3 * np.sin(1.2)]])
+    u = found.values["place"][0] - ends
+    speeds = [u[k] @ [-ends[k, 1], ends[k, 0] - 0.4 * k] for k in (0, 1)]
+    assert found.values["manipulability"][0] == pytest.approx(abs(np.prod(speeds) / np.linalg.det(u)), rel=1e-9)
+    with pytest.raises(InputError, match=r'no more motors than .* degrees of freedom, found 3 \("\w", "\w", "\w"\)'):
+        mapped(written(tmp_path, five_bar(order, third=True)), tmp_path / "none", "A=2.0", "C=1.2", point="b.tip")
+
+
 def test_stable_depth_of_cut_is_that_of_the_response(arm, tmp_path):
     """1/(2 max Re ν) of C̄ G, with G solved for line by line, of the worst of twelve feeds; a joint named "turn"."""
     scene = arm.with_name("damped.toml")
