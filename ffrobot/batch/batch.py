@@ -42,10 +42,11 @@ class Batch:
 
     def __exit__(self, *of_error: object) -> None:
         """Begin no job that has not begun, and end the processes of this machine, with the jobs under way."""
-        for future in self._futures:
-            future.cancel()
         if isinstance(self._executor, Processes):
             self._executor.shutdown(cancel_futures=True)
+            return
+        for future in self._futures:  # Python 3.11 fails at cancelled jobs of processes that end
+            future.cancel()
 
     def results(self, function: Callable[[J], R], jobs: Sequence[J]) -> Iterator[tuple[int, R]]:
         """Yield number and result of every job, in the order in which they end; jobs of killed processes run again.

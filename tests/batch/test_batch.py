@@ -103,15 +103,19 @@ def test_killed_processes_are_replaced(tmp_path):
             list(batch.results(_dies, range(2)))
 
 
-def test_processes_end_with_their_batch():
+@pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
+@pytest.mark.parametrize("count", [8, 2])
+def test_processes_end_with_their_batch(count):
+    """After all of 8 jobs, and with most of them waiting, as after Ctrl-C."""
     with Batch(lambda: Processes(2)) as batch:
-        processes = {pid for _, pid in batch.results(_pid, range(8))}
+        processes = {pid for _, (_, pid) in zip(range(count), batch.results(_pid, range(8)), strict=False)}
     for pid in processes:
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)
 
 
 def _pid(_):
+    time.sleep(0.1)
     return os.getpid()
 
 
