@@ -9,7 +9,6 @@ import numpy as np
 import tree_oracle
 from oracle_3d import Mechanism
 from rotations import quaternion
-from triad_measures import Ground, Joint, Section, Spinning
 
 from ffrobot.common.arrays import Array
 from ffrobot.mbs.model.gears import resistance
@@ -32,70 +31,83 @@ def accelerated(motion) -> Accelerated:
 
 
 class Absolute(NamedTuple):
-    """One state of a tree in the coordinates of `mechanism`, with B (N, n_v): v = B v of the tree."""
+    """One state of a tree in the coordinates of its bodies, with B (N, n_v): v = B v of the tree."""
 
-    mechanism: Mechanism
     q: Array
     v: Array
     B: Array
 
 
 def mechanism_of(tree, gravity) -> Mechanism:
-    """Bodies of a tree and rotors in its revolute joints; without constraints, loads, or what else acts in joints."""
-    rotors = [(row, inertia) for node in tree.nodes for row, inertia in spinning_rotor(tree, node)]
-    return Mechanism([node.body for node in tree.nodes], np.array(gravity), rotors=rotors)
+    return Mechanism([node.body for node in tree.nodes], gravity)
 
 
-def spinning_rotor(tree, node):
-    """The rotor in the revolute joint that carries a body, if there is one: its row and inertia in kg·m²."""
-    inertia, ratio = rotor(node)
-    if inertia and node.joint.type != "prismatic":
-        sides = (node.outer, node.inner) if node.backwards else (node.inner, node.outer)
-        yield Spinning(*(triad(tree, section) for section in sides), ratio), inertia
+class Rotor(NamedTuple):
+    """Of a revolute joint: inertia J in kg·m², the triad along whose z it spins, and its spin by v (T, n_v)."""
+
+    inertia: float
+    at: tree_oracle.Motion
+    by_v: Array
 
 
-def triad(tree, section):
-    """A section of the tree as the oracle has it."""
-    if section.body < 0:
-        return Ground(section.position, section.triad)
-    return Section(tree.nodes[section.body].body.name, section.point, section.triad, section.still)
+def rotors(tree, q):
+    """Those in revolute joints; a rotor on a, behind a gear of ratio N, spins by N Ω_b − (N − 1) Ω_a."""
+    frames = tree_oracle.frames(tree, q)
+    for node in tree.nodes:
+        inertia, N = rotor(node)
+        if inertia and node.joint.type != "prismatic":
+            sides = (node.outer, node.inner) if node.backwards else (node.inner, node.outer)
+            a, b = (tree_oracle.motion(tree, section, q, frames) for section in sides)
+            yield Rotor(inertia, a, by_rates(a.F[:, :, 2], N * b.L[:, 3:] - (N - 1) * a.L[:, 3:]))
+
+
+def by_rates(vectors, L):
+    """Work (T, n_v) of vectors (T, 3) on what L (T, 3, n_v) says."""
+    return np.einsum("ti,tij->tj", vectors, L)
+
+
+def rotor_forces(tree, q, v, a):
+    """Forces along v (T, n_v) that these rotors take besides: J spin along z of a, which turns with Ω_a."""
+
+    def spins(q, _):
+        return np.array([np.sum(of.by_v * v, axis=1) for of in rotors(tree, q)])
+
+    found = np.zeros_like(v)
+    for of, spin, slope in zip(rotors(tree, q), spins(q, 0.0), tree_oracle.rate(spins, tree, q, v), strict=True):
+        turning = np.cross(np.einsum("tij,tj->ti", of.at.L[:, 3:], v), of.at.F[:, :, 2])
+        acceleration = np.sum(of.by_v * a, axis=1) + slope
+        found += of.inertia * (acceleration[:, None] * of.by_v + by_rates(spin[:, None] * turning, of.at.L[:, 3:]))
+    return found
+
+
+def of_bodies(mechanism, tree, q):
+    """B (T, N, n_v): by v of the tree, (Ṙ, ω̄, ṗ) of all bodies."""
+    B = np.zeros((len(q), mechanism.n_v, tree.n_v))
+    for node, frame in zip(tree.nodes, tree_oracle.frames(tree, q), strict=True):
+        own = B[:, mechanism.columns(node.body.name)]
+        own[:, :3], own[:, 3:6] = frame.L[:, :3], np.swapaxes(frame.F, 1, 2) @ frame.L[:, 3:]
+        own[:, 6:, node.p_v] = np.eye(node.body.n_modes)
+    return B
 
 
 def absolute_states(mechanism, state):
     """`Absolute` of each of the states."""
-    at = mechanism.coordinates
-    for k in range(len(state.q)):
-        q, B = np.zeros(at.n_q), np.zeros((at.n_v, state.v.shape[1]))
+    for k, B in enumerate(of_bodies(mechanism, state.tree, state.q)):
+        q = np.zeros(mechanism.n_q)
         for node, frame in zip(state.tree.nodes, state.frames, strict=True):
-            R, e, p = at.parts(q, node.body.name)
+            R, e, p = mechanism.parts(q, node.body.name)
             R[:], e[:], p[:] = frame.r[k], quaternion(frame.F[k]), state.q[k, node.p_q]
-            of_body = B[at.columns(node.body.name)]
-            of_body[:3], of_body[3:6] = frame.L[k, :3], frame.F[k].T @ frame.L[k, 3:]
-            of_body[6:, node.p_v] = np.eye(len(p))
-        yield Absolute(mechanism, q, B @ state.v[k], B)
+        yield Absolute(q, B @ state.v[k], B)
 
 
 def absolute_accelerations(mechanism, state) -> Array:
-    """V̇ (T, N) of all bodies, by rows of the joints, which hold, and of their coordinates, which accelerate by a."""
-    tree, found, modes = state.tree, np.zeros((len(state.q), mechanism.size)), []
-    joints = []
-    for node in tree.nodes:
-        sides = triad(tree, node.inner), triad(tree, node.outer)
-        lead = getattr(node.joint, "lead", 0.0) / (2 * np.pi)
-        joints.append(Joint(node.joint.name, node.joint.type, *sides, lead))
-    held, moved = ([row for joint in joints for row in rows(joint)] for rows in (Joint.rows, Joint.coordinates))
-    for node in tree.nodes:
-        modes += range(*mechanism.coordinates.columns(node.body.name).indices(mechanism.size))[6:]
-    of_modes = np.concatenate([np.r_[node.p_v] for node in tree.nodes]).astype(int)
-    for k, at in enumerate(absolute_states(mechanism, state)):
-        known = {}
-        C, G = ([mechanism.row(row, at.q, at.v, known) for row in rows] for rows in (held, moved))
-        gradients = np.array([row.gradient for row in (*C, *G)]).reshape(-1, mechanism.size)
-        right = -np.array([row.bias for row in (*C, *G)])
-        right[len(C) :] += gradients[len(C) :] @ at.B @ state.a[k]
-        rows = np.vstack([gradients, np.eye(mechanism.size)[modes]])
-        found[k] = np.linalg.solve(rows, np.concatenate([right, state.a[k, of_modes]]))
-    return found
+    """V̇ (T, N) of all bodies: B v̇ + Ḃ v."""
+
+    def velocities(q, _):
+        return np.einsum("tij,tj->ti", of_bodies(mechanism, state.tree, q), state.v)
+
+    B = of_bodies(mechanism, state.tree, state.q)
+    return np.einsum("tij,tj->ti", B, state.a) + tree_oracle.rate(velocities, state.tree, state.q, state.v)
 
 
 def gear_forces(tree, q, v):
@@ -114,7 +126,7 @@ def required_forces(model, state, times):
     mechanism = mechanism_of(state.tree, model.scene.gravity)
     accelerations = absolute_accelerations(mechanism, state)
     found = resistance(model, state.q, state.v) - given_forces(model, state.q, state.frames, times)
-    found -= gear_forces(model.tree, state.q, state.v)
+    found += rotor_forces(state.tree, state.q, state.v, state.a) - gear_forces(model.tree, state.q, state.v)
     for k, (at, a) in enumerate(zip(absolute_states(mechanism, state), accelerations, strict=True)):
         found[k] += at.B.T @ (mechanism.mass_matrix(at.q) @ a - mechanism.forces(at.q, at.v))
     for node in state.tree.nodes:
@@ -132,13 +144,13 @@ class BodyForces(NamedTuple):
 
 def body_forces(state: Accelerated, gravity) -> list[BodyForces]:
     """By which each body moves as it does."""
-    mechanism = Mechanism([node.body for node in state.tree.nodes], np.array(gravity))
+    mechanism = mechanism_of(state.tree, gravity)
     accelerations = absolute_accelerations(mechanism, state)
     needed = np.array([
         mechanism.mass_matrix(at.q) @ a - mechanism.forces(at.q, at.v)
         for at, a in zip(absolute_states(mechanism, state), accelerations, strict=True)
     ])  # fmt: skip
-    parts = [needed[:, mechanism.coordinates.columns(node.body.name)] for node in state.tree.nodes]
+    parts = [needed[:, mechanism.columns(node.body.name)] for node in state.tree.nodes]
     return [
         BodyForces(own[:, :3], np.einsum("tij,tj->ti", frame.F, own[:, 3:6]), own[:, 6:])
         for own, frame in zip(parts, state.frames, strict=True)
@@ -203,6 +215,8 @@ def energies(motion) -> Energies:
     kinetic, strain, gravitational = np.array(found).T
     of_gears, dissipated = gear_energy(tree, motion.q, motion.v)
     dissipated += np.sum(motion.v * resistance(model, motion.q, motion.v), axis=1)
+    for of in rotors(tree, motion.q):
+        kinetic += 0.5 * of.inertia * np.sum(of.by_v * motion.v, axis=1) ** 2
     for node in tree.nodes:
         p_dot = motion.v[:, node.p_v]
         dissipated += np.einsum("ti,ij,tj->t", p_dot, node.body.damping, p_dot)
@@ -214,14 +228,13 @@ def momentum(motion) -> Momentum:
     """Of all bodies and rotors, about the global origin."""
     motion = behind_gears(motion)
     tree, state, (linear, angular) = motion.model.tree, accelerated(motion), np.zeros((2, len(motion.time), 3))
-    mechanism = Mechanism([node.body for node in tree.nodes], np.zeros(3))
+    for of in rotors(tree, motion.q):
+        angular += of.inertia * np.sum(of.by_v * motion.v, axis=1)[:, None] * of.at.F[:, :, 2]
+    mechanism = mechanism_of(tree, np.zeros(3))
     for k, at in enumerate(absolute_states(mechanism, state)):
         of_all = mechanism.mass_matrix(at.q) @ at.v
-        for row, inertia in (one for node in tree.nodes for one in spinning_rotor(tree, node)):
-            axis = mechanism.marker(row.a, at.q, at.v).F[:, 2]
-            angular[k] += inertia * mechanism.row(row, at.q, at.v).rate * axis
-        for node, frame in zip(tree.nodes, tree_oracle.frames(motion.model.tree, motion.q), strict=True):
-            along, about, _ = mechanism.coordinates.rates(of_all, node.body.name)
+        for node, frame in zip(tree.nodes, state.frames, strict=True):
+            along, about, _ = mechanism.rates(of_all, node.body.name)
             linear[k] += along
             angular[k] += frame.F[k] @ about + np.cross(frame.r[k], along)
     return Momentum(linear, angular)

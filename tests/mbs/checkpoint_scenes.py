@@ -87,7 +87,7 @@ def as_tuples(value):
 def as_scene(tree, turned):
     """The tree with triads that a scene can say: without an axis they are the axes of the first side."""
     joints = [_along_the_first(joint, turned) if joint.type in UNDIRECTED else joint for joint in tree.joints]
-    plain = Tree(tree.bodies, joints, tree.loops, tree.poses)
+    plain = Tree(tree.bodies, joints, tree.loops, tree.poses, tree.p)
     tables = [joint_table(joint, turned) for joint in (*joints, *tree.loops)]
     return plain, tables
 

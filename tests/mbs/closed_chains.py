@@ -58,12 +58,11 @@ def closed_chain(rng, types, kinds, size=0.01, rotors=False):
     """
     tree = random_tree(rng, types[:-1], kinds, chain=True, size=size)
     plain, tables = as_scene(tree, False)
-    model, mechanism = tree_model(plain, tables), plain.mechanism()
+    model = tree_model(plain, tables)
     joints = coordinates(model, plain, False)
-    p = {body.name: mechanism.coordinates.parts(tree.q, body.name)[2] for body in tree.bodies}
     q = model.tree.at_rest(joints)
     for node in model.tree.nodes:
-        q[node.p_q] = p[node.body.name]
+        q[node.p_q] = tree.p[node.body.name]
     end = f"b{len(tree.bodies)}.tip"
     tip = tree_oracle.motion(
         model.tree, model.tree.section(end, np.eye(3)), q[None], tree_oracle.frames(model.tree, q[None])
@@ -75,7 +74,7 @@ def closed_chain(rng, types, kinds, size=0.01, rotors=False):
     if type_ == "universal":
         last["second_axis"] = (R.T @ np.cross(axis, rng.standard_normal(3))).tolist()
     found = {table["name"]: table | FRICTION | (ROTOR if rotors else {}) for table in (*tables, last)}
-    return ClosedChain(plain, found, {**joints, name: np.zeros(COUNT[type_])}, p)
+    return ClosedChain(plain, found, {**joints, name: np.zeros(COUNT[type_])}, tree.p)
 
 
 def _moments(type_):

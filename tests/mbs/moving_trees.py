@@ -24,11 +24,11 @@ def moving(rng, types, kinds, loops=0):
     """A random tree at random velocities, and what the recursion makes of it: motion of one instant, and its core."""
     tree = random_tree(rng, types, kinds, chain=True, size=SMALL, loops=loops)
     plain, tables = as_scene(tree, False)
-    model, mechanism = tree_model(plain, tables), plain.mechanism()
+    model = tree_model(plain, tables)
     system = MultibodySystem(model)
     q = model.tree.at_rest(coordinates(model, plain, False))
     for node in model.tree.nodes:
-        q[node.p_q] = mechanism.coordinates.parts(tree.q, node.body.name)[2]
+        q[node.p_q] = tree.p[node.body.name]
     v = rng.standard_normal(model.tree.n_v)
     C_v = row_values(model, q[None], NOW)[1][0]
     v -= np.linalg.pinv(C_v, rcond=1e-10) @ (C_v @ v)

@@ -1,16 +1,13 @@
 """The equations in 3D: absolute coordinates, dense matrices, written to be read, not to be fast.
 
 Shares nothing with the compiled core but `Body`. Of one body after the other q = (R, e, p) with the quaternion e
-(scalar first) and v = (Ṙ, ω̄, ṗ) with ω̄ in body axes. Symbols: Shabana, Dynamics of Multibody Systems, ch. 5; turning
-sections and joints: docs/theory.md.
+(scalar first) and v = (Ṙ, ω̄, ṗ) with ω̄ in body axes. Symbols: Shabana, Dynamics of Multibody Systems, ch. 5.
 """
 
-from dataclasses import dataclass, field
 from types import SimpleNamespace
 
 import numpy as np
-from rotations import exponential, left_jacobian, left_jacobian_rate, rotation, skew
-from triad_measures import Coordinates, RowState
+from rotations import rotation, skew
 
 
 def coupling(body):
@@ -141,108 +138,53 @@ def stiffened_forces(body, A, p, omega, p_dot, g):
     return Q
 
 
-@dataclass
-class MarkerState:
-    """Of a triad: place r, axes F (columns), velocity (ṙ, Ω) (6,), its Jacobian L (6, N) and bias: (r̈, Ω̇) for v̇ = 0."""
-
-    r: np.ndarray
-    F: np.ndarray
-    velocity: np.ndarray
-    L: np.ndarray
-    bias: np.ndarray
-
-
-@dataclass
 class Mechanism:
-    """Bodies, and rotors (row, inertia)."""
+    """Bodies, each by itself: where R, e, p of each are in q, and Ṙ, ω̄, ṗ in v."""
 
-    bodies: list
-    gravity: np.ndarray
-    rotors: list = field(default_factory=list)
+    def __init__(self, bodies, gravity):
+        self.bodies, self.gravity = bodies, np.array(gravity, dtype=float)
+        self._modes = {body.name: body.n_modes for body in bodies}
+        self._first_q = dict(zip(self._modes, np.cumsum([0] + [7 + n for n in self._modes.values()]), strict=False))
+        self._first_v = dict(zip(self._modes, np.cumsum([0] + [6 + n for n in self._modes.values()]), strict=False))
+        self.n_q, self.n_v = (sum(k + n for n in self._modes.values()) for k in (7, 6))
 
-    def __post_init__(self):
-        self.gravity = np.array(self.gravity, dtype=float)
-        self.coordinates = Coordinates([(body.name, body.n_modes) for body in self.bodies])
-        self.size = self.coordinates.n_v
+    def columns(self, name):
+        """Slice of a body in v."""
+        return slice(self._first_v[name], self._first_v[name] + 6 + self._modes[name])
 
-    def body(self, name):
-        return next(body for body in self.bodies if body.name == name)
+    def parts(self, q, name):
+        """R, e, p: views of q."""
+        i, n = self._first_q[name], self._modes[name]
+        return q[i : i + 3], q[i + 3 : i + 7], q[i + 7 : i + 7 + n]
+
+    def rates(self, v, name):
+        """Ṙ, ω̄, ṗ: views of v."""
+        own = v[self.columns(name)]
+        return own[:3], own[3:6], own[6:]
 
     def mass_matrix(self, q):
-        M = np.zeros((self.size, self.size))
+        M = np.zeros((self.n_v, self.n_v))
         for body in self.bodies:
-            i = self.coordinates.columns(body.name)
-            _, e, p = self.coordinates.parts(q, body.name)
+            i = self.columns(body.name)
+            _, e, p = self.parts(q, body.name)
             M[i, i] = body_mass_matrix(body, rotation(e), p)
-        for row, J in self.rotors:
-            gradient = self.row(row, q, np.zeros(self.size)).gradient
-            M += J * np.outer(gradient, gradient)
         return M
 
     def forces(self, q, v):
         """Q (N,): quadratic velocity, elastic, damping and gravity forces."""
-        Q = np.zeros(self.size)
+        Q = np.zeros(self.n_v)
         for body in self.bodies:
-            _, e, p = self.coordinates.parts(q, body.name)
-            _, omega, p_dot = self.coordinates.rates(v, body.name)
+            _, e, p = self.parts(q, body.name)
+            _, omega, p_dot = self.rates(v, body.name)
             own = body_forces(body, rotation(e), p, omega, p_dot, self.gravity)
-            Q[self.coordinates.columns(body.name)] += own
-        for row, J in self.rotors:
-            state = self.row(row, q, v)
-            Q -= J * (state.bias * state.gradient + state.rate * state.axis_turns)
+            Q[self.columns(body.name)] = own
         return Q
-
-    def marker(self, at, q, v):
-        """A section's triad (`triad_measures.Section`), of a body or the ground."""
-        L = np.zeros((6, self.size))
-        if at.body is None:
-            return MarkerState(np.asarray(at.position, dtype=float), at.triad, np.zeros(6), L, np.zeros(6))
-        body, i = self.body(at.body), self.coordinates.columns(at.body)
-        (R, e, p), (_, omega, p_dot) = self.coordinates.parts(q, at.body), self.coordinates.rates(v, at.body)
-        A, n = rotation(e), body.n_modes
-        if at.point:
-            section = body.points[at.point]
-            K = np.zeros((6, n, n)) if body.stiffening is None else body.stiffening.at(at.point)
-            x, Phi, Phi_r = section.position, section.translation, section.rotation
-        else:
-            x, Phi, Phi_r, K = np.zeros(3), np.zeros((3, n)), np.zeros((3, n)), np.zeros((6, n, n))
-        if at.still:
-            Phi_r, K = 0 * Phi_r, K * np.repeat([1, 0], 3)[:, None, None]
-        u, u_p = x + Phi @ p - 0.5 * p @ K[:3] @ p, Phi - K[:3] @ p
-        phi, phi_p = Phi_r @ p - 0.5 * p @ K[3:] @ p, Phi_r - K[3:] @ p
-        phi_dot, J_l = phi_p @ p_dot, left_jacobian(phi)
-        L[:3, i] = np.hstack([np.eye(3), -A @ skew(u), A @ u_p])
-        L[3:, i] = np.hstack([np.zeros((3, 3)), A, A @ J_l @ phi_p])
-        spin = np.cross(omega, J_l @ phi_dot) + left_jacobian_rate(phi, phi_dot) - J_l @ (p_dot @ K[3:] @ p_dot)
-        carried = np.cross(omega, np.cross(omega, u)) + 2 * np.cross(omega, u_p @ p_dot) - p_dot @ K[:3] @ p_dot
-        F = A @ exponential(phi) @ at.triad
-        return MarkerState(R + A @ u, F, L @ v, L, np.concatenate([A @ carried, A @ spin]))
-
-    def row(self, row, q, v, known=None):
-        """Value, rate, gradient (N,) and bias of a row: its second derivative is gradient · v̇ + bias.
-
-        `known`: markers found before at this state, by their identity.
-        """
-        known = {} if known is None else known
-        for at in (row.a, row.b):
-            if id(at) not in known:
-                known[id(at)] = self.marker(at, q, v)
-        a, b = known[id(row.a)], known[id(row.b)]
-        found = row.between(a, b)
-        ends = ((found.on_a, a), (found.on_b, b))
-        return RowState(
-            value=found.value,
-            rate=sum(on @ end.velocity for on, end in ends),
-            gradient=sum(on @ end.L for on, end in ends),
-            bias=sum(on @ end.bias for on, end in ends) + found.extra,
-            axis_turns=found.axis_turns @ a.L[3:],
-        )
 
     def energies(self, q, v):
         """Kinetic, strain and gravitational energy."""
         strain = gravitational = 0.0
         for body in self.bodies:
-            R, e, p = self.coordinates.parts(q, body.name)
+            R, e, p = self.parts(q, body.name)
             s = inertia(body, p).s
             if body.stiffening is not None:
                 s = s - 0.5 * p @ body.stiffening.K_s @ p

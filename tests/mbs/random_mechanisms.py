@@ -9,14 +9,11 @@ from types import MappingProxyType
 import numpy as np
 from material_points import random_cloud
 from numpy.polynomial import Legendre, Polynomial
-from oracle_3d import Mechanism
-from rotations import quaternion, random_rotation, rotation, rotation_about
-from triad_measures import Ground, Joint, Section
+from rotations import exponential, random_rotation, rotation_about
 
-from ffrobot.mbs.model.body import Body, BodyPoint, Stiffening, from_modal_body, rigid_body
+from ffrobot.mbs.model.body import Body, BodyPoint, Stiffening, bent_section, from_modal_body, rigid_body
 
 TYPES = ("revolute", "prismatic", "screw", "cylindrical", "universal", "spherical", "planar", "weld", "free")
-G = np.array([0.4, -1.1, -9.5])
 
 
 def random_rigid(rng, name):
@@ -112,6 +109,35 @@ class _shapes:  # noqa: N801 (reads as a function of x/length)
         return self._T @ np.array([f.deriv()(xi) for f in self._basis])
 
 
+@dataclass(frozen=True)
+class Section:
+    """A triad (columns, axes of the section) on a section of a body."""
+
+    body: str
+    point: str
+    triad: np.ndarray
+
+
+@dataclass(frozen=True)
+class Ground:
+    """A triad that stands still, at `position` in m."""
+
+    position: np.ndarray
+    triad: np.ndarray
+    body = None
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint of a type of the scene file between triads a and b, h = lead/2π of a screw (m/rad)."""
+
+    name: str
+    type: str
+    a: object
+    b: object
+    h: float = 0.0
+
+
 @dataclass
 class JointState:
     """Pose of triad b on a: way d (3,) and axes C (3, 3) in the axes of a; `coordinates` as its type defines them."""
@@ -144,17 +170,36 @@ def random_pose(rng, joint):
 class Tree:
     """Bodies, the joints that carry them (joint k carries body k, on its second side), joints that close loops.
 
-    `q` meets all joints; `poses` by joint. Joints without a partner stand on the ground.
+    `poses` by joint, modal coordinates `p` by body. Joints without a partner stand on the ground.
     """
 
     bodies: list
     joints: list
     loops: list = field(default_factory=list)
     poses: dict = field(default_factory=dict)
-    q: np.ndarray | None = None
+    p: dict = field(default_factory=dict)
 
-    def mechanism(self):
-        return Mechanism(self.bodies, G)
+    def placed(self):
+        """By body its place R and axes A, where the pose of its joint says."""
+        found = {}
+        for body, joint in zip(self.bodies, self.joints, strict=True):
+            pose, (r, F), (u, E) = self.poses[joint.name], self.triad(joint.a, found), self.bent(joint.b)
+            A = F @ pose.C @ E.T
+            found[body.name] = r + F @ pose.d - A @ u, A
+        return found
+
+    def triad(self, at, placed):
+        """Its place and axes."""
+        if at.body is None:
+            return at.position, at.triad
+        (R, A), (u, E) = placed[at.body], self.bent(at)
+        return R + A @ u, A @ E
+
+    def bent(self, section):
+        """The same in axes of the body, bent by its p."""
+        body = next(body for body in self.bodies if body.name == section.body)
+        at = bent_section(body, section.point, self.p[body.name])
+        return at.u, exponential(at.phi) @ section.triad
 
 
 def random_body(rng, name, kinds=("rigid", "solid", "beam", "supported beam")):
@@ -187,42 +232,28 @@ def random_tree(rng, types, kinds=("rigid", "solid", "beam", "supported beam"), 
         tree.bodies.append(body)
         tree.joints.append(Joint(f"j{k}", type_, a, b, 0.15 if type_ == "screw" else 0.0))
         tree.poses[f"j{k}"] = random_pose(rng, tree.joints[-1])
-    tree.q = placed(tree, [size * rng.standard_normal(body.n_modes) for body in tree.bodies])
+    tree.p = {body.name: size * rng.standard_normal(body.n_modes) for body in tree.bodies}
     for k in range(1, loops + 1):
         _close_loop(rng, tree, f"loop{k}")
     return tree
 
 
-def placed(tree, p):
-    """Q with every body where its joint's pose says, bent by p (one array per body)."""
-    mechanism = Mechanism(tree.bodies, G)
-    q, rest = np.zeros(mechanism.coordinates.n_q), np.zeros(mechanism.size)
-    for body, joint, own in zip(tree.bodies, tree.joints, p, strict=True):
-        R, e, bent = mechanism.coordinates.parts(q, body.name)
-        e[:], bent[:] = [1, 0, 0, 0], own
-        pose, a, b = tree.poses[joint.name], mechanism.marker(joint.a, q, rest), mechanism.marker(joint.b, q, rest)
-        A = a.F @ pose.C @ b.F.T
-        e[:] = quaternion(A)
-        R[:] = a.r + a.F @ pose.d - rotation(e) @ b.r
-    return q
-
-
 def _close_loop(rng, tree, name):
     """A joint from the last body to the ground or another: its section there is made where the loop closes."""
-    mechanism, last = Mechanism(tree.bodies, G), tree.bodies[-1]
+    placed, last = tree.placed(), tree.bodies[-1]
     types = [type_ for type_ in TYPES if type_ not in ("weld", "free")]
     joint = Joint(name, types[rng.integers(len(types))], None, None, 0.1)
     pose, n = random_pose(rng, joint), last.n_modes
     a = Ground(rng.uniform(-0.5, 0.5, 3), random_rotation(rng))
     if len(tree.bodies) > 1 and rng.integers(2):
         a = Section(tree.bodies[int(rng.integers(len(tree.bodies) - 1))].name, "side", random_rotation(rng))
-    at = mechanism.marker(a, tree.q, np.zeros(mechanism.size))
-    R, e, p = mechanism.coordinates.parts(tree.q, last.name)
+    r, F = tree.triad(a, placed)
+    (R, A), p = placed[last.name], tree.p[last.name]
     Phi, Phi_r = 0.3 * rng.standard_normal((3, n)), 0.3 * rng.standard_normal((3, n))
-    u = rotation(e).T @ (at.r + at.F @ pose.d - R)
+    u = A.T @ (r + F @ pose.d - R)
     points = dict(last.points) | {name: BodyPoint(u - Phi @ p, Phi, Phi_r)}
     tree.bodies[-1] = replace(last, points=MappingProxyType(points))
-    section = Mechanism(tree.bodies, G).marker(Section(last.name, name), tree.q, np.zeros(mechanism.size))
-    b = Section(last.name, name, section.F.T @ at.F @ pose.C)
+    _, section = tree.triad(Section(last.name, name, np.eye(3)), placed)
+    b = Section(last.name, name, section.T @ F @ pose.C)
     tree.loops.append(replace(joint, a=a, b=b))
     tree.poses[name] = pose

@@ -1,4 +1,4 @@
-"""Rotations in 3D: quaternions (scalar first), rotation vectors, and their rates. SciPy's, but for Jacobians."""
+"""Rotations in 3D: quaternions (scalar first), and rotation vectors. SciPy's, but for Jacobians."""
 
 from math import factorial
 
@@ -6,8 +6,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 TERMS = 20  # rounding is reached for |φ| up to 2π
-# (−1)ᵏ/(2k + m)! by m, the highest k first.
-COEFFICIENTS = {m: np.array([(-1) ** k / factorial(2 * k + m) for k in reversed(range(TERMS))]) for m in (2, 3)}
 
 
 def skew(a):
@@ -36,24 +34,14 @@ def quaternion(C):
 
 
 def series(x, m):
-    """Σ (−x)ᵏ/(2k + m)! and its derivative: (1 − cos φ)/φ² for m = 2, (φ − sin φ)/φ³ for m = 3, with x = φ²."""
-    coefficients = COEFFICIENTS[m]
-    return np.polyval(coefficients, x), np.polyval(coefficients[:-1] * np.arange(TERMS - 1, 0, -1), x)
+    """Σ (−x)ᵏ/(2k + m)!: (1 − cos φ)/φ² for m = 2, (φ − sin φ)/φ³ for m = 3, with x = φ²."""
+    return np.polyval([(-1) ** k / factorial(2 * k + m) for k in reversed(range(TERMS))], x)
 
 
 def left_jacobian(phi):
     """J_l: exp(φ + δφ) = exp(J_l δφ) exp(φ) to first order."""
     x, S = phi @ phi, skew(phi)
-    return np.eye(3) + series(x, 2)[0] * S + series(x, 3)[0] * S @ S
-
-
-def left_jacobian_rate(phi, phi_dot):
-    """(dJ_l/dt) φ̇."""
-    x, across = phi @ phi, np.cross(phi, phi_dot)
-    (_, a_slope), (b, b_slope) = series(x, 2), series(x, 3)
-    x_dot = 2 * phi @ phi_dot
-    twice = np.cross(phi, across)
-    return a_slope * x_dot * across + b_slope * x_dot * twice + b * np.cross(phi_dot, across)
+    return np.eye(3) + series(x, 2) * S + series(x, 3) * S @ S
 
 
 def rotation_about(axis, angle):

@@ -77,7 +77,7 @@ def check_cuts(chain):
     def accelerations(motion):
         mechanism = Mechanism([node.body for node in motion.model.tree.nodes], np.zeros(3))
         (found,) = absolute_accelerations(mechanism, accelerated(motion))
-        return np.array([found[mechanism.coordinates.columns(body.name)][:6] for body in chain.tree.bodies])
+        return np.array([found[mechanism.columns(body.name)][:6] for body in chain.tree.bodies])
 
     expected = accelerations(one)
     assert totals(one)[0].dissipated_power[0] > 0.05

@@ -99,7 +99,7 @@ def check_points(motion):
         modal = acting_forces(motion).found.modal[:, node.p_v]
         np.testing.assert_allclose(modal, expected.modal, rtol=0, atol=1e-12 * np.abs(expected.modal).max(initial=1.0))
         of_body = acting_forces(motion).of_body(number)
-        a, alpha, _ = np.split(of_all[:, mechanism.coordinates.columns(node.body.name)], [3, 6], axis=1)
+        a, alpha, _ = np.split(of_all[:, mechanism.columns(node.body.name)], [3, 6], axis=1)
         alpha = np.einsum("tij,tj->ti", tree_oracle.frames(motion.model.tree, motion.q)[number].F, alpha)
         for found, wanted in ((of_body.a, a), (of_body.alpha, alpha)):
             np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-11 * np.abs(wanted).max(initial=1.0))

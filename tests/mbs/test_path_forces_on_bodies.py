@@ -1,13 +1,14 @@
-"""What forces on paths do on each body alone, in the core, against the wrenches of constraint equations in NumPy."""
+"""What forces on paths do on each body alone, in the core, against the virtual work of constraint equations."""
 
 import numpy as np
 import pytest
 import tree_oracle
 from beam_links import beam_link, rectangle
-from row_wrenches import on_body, row_wrenches
 from tables_3d import Y, Z, joint, revolute, scene
+from tree_oracle import Motion, action, motion, pose, value_and_gradient
 
 import ffrobot
+from ffrobot.common.rotations import skew
 from ffrobot.mbs.model.system import path_forces_on_bodies
 from ffrobot.run.solve import prepare_scene
 from ffrobot.run.watcher import Watcher
@@ -43,8 +44,34 @@ PATHS = {
 }
 
 
+def by_its_body(tree, section, q, frames):
+    """Motion of a section by what its body does alone: L (T, 6, 6 + n) by velocities along the frame's axes, and ṗ."""
+    at, frame, node = motion(tree, section, q, frames), frames[section.body], tree.nodes[section.body]
+    to_section, axes = np.tile(np.eye(6), (2, len(q), 1, 1))
+    to_section[:, :3, 3:] = -skew(at.r - frame.r)
+    axes[:, :3, :3] = axes[:, 3:, 3:] = frame.F
+    of_modes = at.L[..., node.p_v] - to_section @ frame.L[..., node.p_v]
+    return Motion(at.r, at.F, np.concatenate([to_section @ axes, of_modes], axis=2))
+
+
+def still(at, columns):
+    return Motion(at.r, at.F, np.zeros((len(at.r), 6, columns)))
+
+
+def gradient(tree, row, a, b, q, times):
+    """(T, columns of a and b); along a coordinate, of the outer section against the inner one at the same place."""
+    if row.kind != "coordinate":
+        return value_and_gradient(tree, row, a, b, q, times)[1]
+    node = tree.nodes[row.b.body]
+    of_b = b.L - a.L
+    of_b[:, :3] += skew(b.r - a.r) @ a.L[:, 3:]
+    acting = row.sign * action(node.joint, q[:, node.q])[:, :, row.coordinate - node.v.start]
+    F = pose(tree, node.inner, q, tree_oracle.frames(tree, q)).F
+    return sum(np.einsum("tij,tj,tik->tk", F, acting[:, of], of_b[:, of]) for of in (slice(3), slice(3, 6)))
+
+
 @pytest.mark.parametrize("paths", PATHS)
-def test_forces_are_those_of_the_wrenches(paths):
+def test_forces_are_those_of_the_virtual_work(paths):
     model, rng = arm(PATHS[paths]), np.random.default_rng(37)
     tree, times = model.tree, np.array([0.0, 0.03, 0.1])
     rest = tree.at_rest({})
@@ -52,10 +79,14 @@ def test_forces_are_those_of_the_wrenches(paths):
     multipliers, frames = rng.standard_normal((len(times), len(model.rows))), tree_oracle.frames(tree, q)
     expected = {node.body.name: np.zeros((len(times), 6 + node.body.n_modes)) for node in tree.nodes}
     for row, size in zip(model.rows, -multipliers.T, strict=True):
-        sides = row_wrenches(tree, row, size, q, times, frames)
-        for section, wrench in zip((row.a, row.b), sides, strict=True):
-            if section.body >= 0:
-                expected[tree.nodes[section.body].body.name] += on_body(model, q, frames, section, wrench)
+        for moves in (row.a, row.b):
+            if moves.body >= 0:
+                of_one = by_its_body(tree, moves, q, frames)
+                sides = [
+                    of_one if side is moves else still(motion(tree, side, q, frames), of_one.L.shape[2])
+                    for side in (row.a, row.b)
+                ]
+                expected[tree.nodes[moves.body].body.name] += size[:, None] * gradient(tree, row, *sides, q, times)
     found = path_forces_on_bodies(model, times, q, multipliers)
     for body, forces in expected.items():
         np.testing.assert_allclose(found[body], forces, rtol=0, atol=1e-12 * max(np.abs(forces).max(), 1.0))

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 import tree_oracle
 from checkpoint_scenes import as_scene, coordinates, tree_model
-from random_mechanisms import TYPES, placed, random_tree
-from rotations import quaternion, random_rotation
+from random_mechanisms import TYPES, random_tree
+from rotations import random_rotation
 from tree_oracle import row_values, target_rates
 from trees_in_a_plane import TYPES as IN_PLANE
 from trees_in_a_plane import planar_model
 
+from ffrobot.common.rotations import skew
 from ffrobot.mbs import _core
 from ffrobot.mbs.fields.orientations import OrientationLaw
 from ffrobot.mbs.model.nodes import ConstraintRow, Section, rows_of_joint
@@ -36,15 +37,12 @@ def test_bodies_stand_where_the_oracle_has_them(seed, turned):
     rng = np.random.default_rng(seed)
     tree = random_tree(rng, rng.permutation(TYPES)[:6], size=0.1)
     plain, model, q = built(tree, turned)
-    mechanism = plain.mechanism()
-    p = [mechanism.coordinates.parts(tree.q, body.name)[2] for body in tree.bodies]
-    expected = placed(plain, p)
     for node in model.tree.nodes:
-        q[node.p_q] = mechanism.coordinates.parts(tree.q, node.body.name)[2]
+        q[node.p_q] = tree.p[node.body.name]
+    expected = plain.placed()
     for node, frame in zip(model.tree.nodes, tree_oracle.frames(model.tree, q[None]), strict=True):
-        R, e, _ = mechanism.coordinates.parts(expected, node.body.name)
-        np.testing.assert_allclose(frame.r[0], R, atol=1e-13)
-        np.testing.assert_allclose(quaternion(frame.F[0]) * np.sign(e @ quaternion(frame.F[0])), e, atol=1e-13)
+        for found, wanted in zip((frame.r[0], frame.F[0]), expected[node.body.name], strict=True):
+            np.testing.assert_allclose(found, wanted, atol=1e-13)
 
 
 def every_row(rng, model):
@@ -92,6 +90,11 @@ def test_core_moves_trees_in_a_plane_as_numpy_does(seed):
     assert_core_is_the_oracle(rng, planar_model(rng, rng.permutation(IN_PLANE * 2)))
 
 
+def placed(tree, q):
+    """Axes and places (bodies, T, 3, 4) of the frames of all bodies."""
+    return np.array([np.dstack([at.F, at.r]) for at in tree_oracle.poses(tree, q)])
+
+
 def assert_core_is_the_oracle(rng, model):
     tree, (q, v) = model.tree, states_of(rng, model)
     places, frames = tree.places(q, v), tree_oracle.frames(tree, q)
@@ -104,6 +107,11 @@ def assert_core_is_the_oracle(rng, model):
         rates = np.einsum("tij,tj->ti", of.L, v)
         for ours, numpys in zip(at, (of.r, of.F, rates[:, :3], rates[:, 3:]), strict=True):
             np.testing.assert_allclose(ours, numpys, rtol=0, atol=CLOSE * max(1.0, np.abs(numpys).max()))
+    of_differences = tree_oracle.rate(lambda q, _: placed(tree, q), tree, q, v)
+    for of, rate in zip(frames, of_differences, strict=True):
+        velocity, omega = np.split(np.einsum("tij,tj->ti", of.L, v), 2, axis=1)
+        exact = np.dstack([skew(omega) @ of.F, velocity])
+        np.testing.assert_allclose(rate, exact, rtol=0, atol=1e-10 * max(1.0, np.abs(exact).max()))
     moved = tree_oracle.integrate(tree, q, 0.3 * v)
     np.testing.assert_allclose(tree.integrate(q, 0.3 * v), moved, rtol=0, atol=CLOSE * np.abs(moved).max())
     model, times = replace(model, rows=(*model.rows, *every_row(rng, model))), np.array([0.0, 0.2, 0.5])
