@@ -1,21 +1,17 @@
 """Scene files in 3D: what their records take, and the message of each mistake."""
 
 import copy
-from pathlib import Path
 
 import numpy as np
 import pytest
-import scene_of
 import tables_3d
+from checkpoint_mechanisms import FOLDER
 from tables_3d import X, Y, joint, revolute, rigid
 
 from ffrobot.common.errors import InputError
 from ffrobot.common.rotations import exponential, quaternions
 from ffrobot.mbs.fields.orientations import OrientationLaw
 from ffrobot.scene.load import validated_scene
-
-FOLDER = Path(scene_of.__file__).parent
-
 
 HAND_INERTIA = [[0.01, 0.0, 0.0], [0.0, 0.02, 0.001], [0.0, 0.001, 0.02]]
 ARM = tables_3d.scene(

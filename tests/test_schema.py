@@ -8,9 +8,8 @@ from pathlib import Path
 
 import jsonschema
 import pytest
-import scene_of
 from checkpoint_mechanisms import CASES as CHECKPOINTS
-from checkpoint_mechanisms import load as checkpoint
+from checkpoint_mechanisms import FOLDER
 
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.link_file import read_link
@@ -54,7 +53,7 @@ def test_scenes_of_the_cases_pass(validator, path):
 
 @pytest.mark.parametrize("name", CHECKPOINTS)
 def test_scenes_in_3d_pass(validator, name):
-    scene = tomllib.loads(scene_of.scene(checkpoint(name), 1e-8)[0])
+    scene = parsed(FOLDER / f"{name}.toml")
     validator["spatial"].validate(scene)
     validator["scene"].validate(scene)
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path += [str(Path(__file__).parents[1] / folder) for folder in ("mbs", "checkpoints/spatial")]
+sys.path += [str(Path(__file__).parents[1] / folder) for folder in ("mbs",)]
 
 from links import ANGLES, TIP, arm, arm_links, quintic, ritz_link
 from mechanisms import forward, make_model, pcid, revolute

@@ -9,7 +9,6 @@ and memory, and after `solve` the commands that read its results. Exit code 1 wh
 traceback, a crash, no end within five minutes, a message that names no file, other words on stderr.
 """
 
-import json
 import os
 import random
 import shutil
@@ -26,9 +25,6 @@ import tomli_w
 from forked_command import BAD, GOOD, outcome, run
 from hostile import Mutator, known_keys, places
 from record import options, record
-
-sys.path.append(str(Path(__file__).parents[1] / "checkpoints" / "spatial"))
-from scene_of import scene
 
 ROOT = Path(__file__).parents[2]
 CASES = ROOT / "cases"
@@ -71,14 +67,6 @@ def shortened(scene: dict[str, Any]) -> dict[str, Any]:
     return scene
 
 
-def write_scene_in_3d(name: str, folder: Path) -> None:
-    text, links = scene(json.loads((CHECKPOINTS / f"{name}.json").read_text(encoding="utf-8")), 1e-5)
-    folder.mkdir()
-    (folder / "scene.toml").write_text(text, encoding="utf-8")
-    for link in links:
-        shutil.copy(CHECKPOINTS / link, folder)
-
-
 class Campaign:
     def __init__(self, folder: Path, seed: int, cases: list[str] | None = None) -> None:
         self.folder, self.chance, self.found = folder, random.Random(seed), Found()
@@ -89,7 +77,9 @@ class Campaign:
         if not ready.exists():
             shutil.copytree(CASES, ready, ignore=shutil.ignore_patterns("*.h5", "figures", "README.md"))
             for name in IN_SPACE:
-                write_scene_in_3d(name, ready / f"checkpoint_{name}")  # cases may have the same name
+                folder = ready / f"checkpoint_{name}"  # cases may have the same name
+                shutil.copytree(CHECKPOINTS / "links", folder / "links")
+                shutil.copy(CHECKPOINTS / f"{name}.toml", folder / "scene.toml")
         names = sorted(path.parent.name for path in ready.glob("*/scene.toml"))
         self.cases = [self.prepared(ready / name) for name in names if cases is None or name in cases]
         keys = {

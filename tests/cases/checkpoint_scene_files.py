@@ -1,26 +1,20 @@
 """Scene files of the checkpoints in 3D, and how closely datasets have to meet their numbers."""
 
 import shutil
-from pathlib import Path
 
 import h5py
 import numpy as np
-import scene_of
-from checkpoint_mechanisms import load
-
-FOLDER = Path(scene_of.__file__).parent
+from checkpoint_mechanisms import FOLDER
 
 
-def write_scene(name, folder, *changes, more=""):
-    """The scene of a checkpoint in a folder, with `changes` (old, new) to its text and `more` after it."""
-    text, links = scene_of.scene(load(name), 1e-8)
-    for link in links:
-        shutil.copy(FOLDER / link, folder)
-    scene = folder / "scene.toml"
+def write_scene(name, folder, *changes):
+    """The scene of a checkpoint in a folder, with `changes` (old, new) to its text."""
+    shutil.copytree(FOLDER / "links", folder / "links")
+    text, scene = (FOLDER / f"{name}.toml").read_text(), folder / "scene.toml"
     for old, new in changes:
         assert old in text
         text = text.replace(old, new)
-    scene.write_text(text + more)
+    scene.write_text(text)
     return scene
 
 

@@ -4,24 +4,19 @@ Vectors change by Q; those that belong to a sense of rotation (angular velocitie
 det(Q) Q: with a mirror they keep their component along its normal and change the others.
 """
 
-import tomllib
-
 import numpy as np
-import scene_of
-from checkpoint_mechanisms import load
+from checkpoint_mechanisms import FOLDER
 from checkpoint_scenes import rpy
 from rotations import exponential
+from scenes_in_3d import read
 
 MIRROR = np.diag([1.0, -1.0, 1.0])
 
 
 def tables_of(name, tolerance):
     """The keys of a checkpoint's scene, its links by their absolute paths."""
-    text, _ = scene_of.scene(load(name), tolerance)
-    tables = tomllib.loads(text)
-    for body in tables["body"]:
-        if "link" in body:
-            body["link"] = f"{scene_of.__file__.rpartition('/')[0]}/links/{body['link']}"
+    tables = read(FOLDER / f"{name}.toml")
+    tables["analysis"][0]["tolerance"] = tolerance
     return tables
 
 

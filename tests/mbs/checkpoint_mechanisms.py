@@ -4,13 +4,10 @@ import json
 from functools import cache
 from pathlib import Path
 
-import scene_of
-
 from ffrobot.fe_models.link import cached_modal_body
 
-FOLDER = Path(scene_of.__file__).parent
-
-CASES = sorted(path.stem for path in FOLDER.glob("*.json") if "scene" in json.loads(path.read_text()))
+FOLDER = Path(__file__).parents[1] / "checkpoints" / "spatial"
+CASES = sorted(path.stem for path in FOLDER.glob("*.toml"))
 
 
 @cache

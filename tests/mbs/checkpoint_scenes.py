@@ -1,12 +1,10 @@
 """Scenes in 3D for tests: those of the checkpoints, and random ones with the joints of a `random_mechanisms.Tree`."""
 
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import scene_of
-from checkpoint_mechanisms import load
+from checkpoint_mechanisms import FOLDER
 from random_mechanisms import Tree
 from rotations import logarithm
 from scipy.spatial.transform import Rotation
@@ -15,17 +13,14 @@ from ffrobot.mbs import _core
 from ffrobot.mbs.model.build import build_model
 from ffrobot.mbs.model.drives import Command, Drives, Replayed
 from ffrobot.mbs.scene.mechanism import MechanismScene
-from ffrobot.scene.load import validated_scene
+from ffrobot.scene.load import load_scene
 
 UNDIRECTED = ("spherical", "weld", "free")
 PLACEHOLDER = {"mass": 1.0, "inertia": [1.0, 1.0, 1.0], "center": [0.0, 0.0, 0.0]}  # bodies are passed beside the scene
 
 
-def checkpoint_scene(name, tolerance=1e-8):
-    """The scene of a checkpoint; its links are found in the folder of the checkpoints."""
-    text, _ = scene_of.scene(load(name), tolerance)
-    text = text.replace('link = "', 'link = "links/')
-    return validated_scene(tomllib.loads(text), Path(scene_of.__file__).with_name("scene.toml"), text)
+def checkpoint_scene(name):
+    return load_scene(FOLDER / f"{name}.toml")
 
 
 def rpy(C):

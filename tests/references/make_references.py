@@ -11,7 +11,7 @@ import warnings
 from pathlib import Path
 
 HERE = Path(__file__).parent
-sys.path[:0] = [str(HERE.parent / name) for name in ("", "campaigns", "cases", "checkpoints/spatial", "mbs")]
+sys.path[:0] = [str(HERE.parent / name) for name in ("", "campaigns", "cases", "mbs")]
 
 import reference_numbers  # noqa: E402
 import reference_scenes  # noqa: E402
