@@ -129,16 +129,23 @@ def displaced_joints(model: Model, start: State, joints: Container[str] | None =
     if not model.loop_rows.any():
         return
     initial, scales = model.scene.initial, model.joint_sizes
-    guess, moved = State(model.tree.at_rest(_numbers(model, initial.joints, "joints")), _guessed_rates(model)), []
+    guess = State(model.tree.at_rest(_numbers(model, initial.joints, "joints")), _guessed_rates(model))
     fastest = float(np.abs(guess.v / np.where(scales > 0, scales, np.inf)).max(initial=0.0))
-    for node in (node for node in model.tree.nodes if node.joint.units):
-        if joints is not None and node.joint.name not in joints:
-            continue
-        ways, rates = np.abs(start.q - guess.q)[node.q], np.abs(start.v - guess.v)[node.v]
-        name, most = node.joint.name, AWAY * scales[node.v]
-        is_elsewhere = name in initial.named("joints") and np.any(ways > most)
-        if is_elsewhere or (name in initial.named("joint_rates") and np.any(rates > fastest * most)):
-            moved.append(name)
+    q, v, nodes = start.q - guess.q, start.v - guess.v, (node for node in model.tree.nodes if node.joint.units)
+    off = [(node.joint.name, q[node.q], v[node.v], scales[node.v]) for node in nodes]
+    rates = _numbers(model, initial.joint_rates, "joint_rates")
+    for one, at in zip(model.cut, model.along_cut.motions(start.q[None], start.v[None], np.zeros(1)), strict=True):
+        name, size = one.joint.name, np.array(1.0 if one.row.kind == "turn" else model.size)
+        rate = rates[name][one.number] if name in rates else 0.0
+        off.append((name, at.coordinate - one.guess, at.rate - rate, size))
+    with_values, with_rates = initial.named("joints"), initial.named("joint_rates")
+    moved = dict.fromkeys(
+        name
+        for name, ways, changes, sizes in off
+        if joints is None or name in joints
+        for names, way, most in ((with_values, ways, sizes), (with_rates, changes, fastest * sizes))
+        if name in names and np.any(np.abs(way) > AWAY * most)
+    )
     if moved:
         yield (
             f"joints {quoted(moved)} start away from the values in [initial], with which no posture and rates close the"

@@ -20,6 +20,7 @@ STARTS = {
     "bodies": {"angles": {"crank": A}, "rates": {"crank": RATE}},
     "rocker": {"joints": {"D": D}, "joint_rates": {"D": D_RATE}},
     "all": {"joints": {"A": A, "B": -0.5, "D": 1.4}, "joint_rates": {"A": RATE}},
+    "one rate": {"joints": closed(A), "joint_rates": {"D": D_RATE}},
 }
 
 
@@ -46,9 +47,17 @@ def test_named_joints_keep_their_values(space, start):
         assert not found.warnings
 
 
-@pytest.mark.parametrize("initial", [{"joints": {"A": A, "D": 2.4}}, {"joint_rates": {"A": RATE, "D": 5.0}}])
+@pytest.mark.parametrize(
+    "initial",
+    [
+        {"joints": {"A": A, "D": 2.4}},
+        {"joint_rates": {"A": RATE, "D": 5.0}},
+        {"joints": closed(A) | {"D": 2.4}},
+    ],
+)
 def test_values_that_no_loop_meets_are_told(initial):
-    with pytest.warns(ffrobot.FfrobotWarning, match='joints "A".* start away from the values'):
+    """Wherever the loop is cut."""
+    with pytest.warns(ffrobot.FfrobotWarning, match='joints .*"[AD]".* start away from the values'):
         started("spatial", {"joints": {"A": A}} | initial)
 
 
