@@ -27,7 +27,7 @@ from ...mbs.run.record import Details, Run
 from ...mbs.scene.analysis import Surroundings
 from ..context import ActuatedContext
 from ..patches.link_patches import link_patches
-from ..patches.patches import PatchArray
+from ..patches.patches import SINGULAR, PatchArray
 from ..patches.records import PztLayout
 from .linear_model import LinearModel, state_space
 from .observer import kalman, model_of_filter
@@ -185,7 +185,8 @@ def _voltages(shape: Array, Phi_V: Array, F_p: Array) -> Array:
     forces, largest = shape @ F_p.T, []
     for start in range(0, Phi_V.shape[1], CHUNK):
         chunk = np.einsum("mn,nsk->smk", shape, Phi_V[:, start : start + CHUNK])
-        reachable = np.linalg.svd(chunk, compute_uv=False)[:, -1] > 0.0
+        sizes = np.linalg.svd(chunk, compute_uv=False)
+        reachable = sizes[:, -1] > sizes[:, 0] / SINGULAR
         worst = np.full(len(chunk), np.inf)
         worst[reachable] = np.abs(np.linalg.pinv(chunk[reachable]) @ forces).max(axis=(1, 2), initial=0.0)
         largest.append(worst)

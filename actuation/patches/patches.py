@@ -181,7 +181,7 @@ def voltage_gain(patches: Reach) -> Array:
         return np.linalg.inv(patches.Phi_V[:served]) @ np.eye(served, n)
     W_sqrt = served_first(served, n, k) if patches.serves_all else patches.W_sqrt
     scale = voltage_scale(patches)
-    return scale[:, None] * np.linalg.pinv(W_sqrt @ patches.Phi_V * scale) @ W_sqrt
+    return scale[:, None] * np.linalg.pinv(W_sqrt @ patches.Phi_V * scale, 1 / SINGULAR) @ W_sqrt
 
 
 def allocation(patches: Reach, *, limited: bool) -> _core.Allocation:
