@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 import tree_oracle
-from oracle_3d import Mechanism
-from rotations import quaternion
+from oracle_3d import body_mass_matrix, energies_of_body, forces_on_body
 
 from ffrobot.common.arrays import Array
 from ffrobot.mbs.model.gears import resistance
@@ -28,18 +27,6 @@ class Accelerated(NamedTuple):
 
 def accelerated(motion) -> Accelerated:
     return Accelerated(motion.model.tree, motion.q, motion.v, motion.a, tree_oracle.frames(motion.model.tree, motion.q))
-
-
-class Absolute(NamedTuple):
-    """One state of a tree in the coordinates of its bodies, with B (N, n_v): v = B v of the tree."""
-
-    q: Array
-    v: Array
-    B: Array
-
-
-def mechanism_of(tree, gravity) -> Mechanism:
-    return Mechanism([node.body for node in tree.nodes], gravity)
 
 
 class Rotor(NamedTuple):
@@ -80,34 +67,39 @@ def rotor_forces(tree, q, v, a):
     return found
 
 
-def of_bodies(mechanism, tree, q):
-    """B (T, N, n_v): by v of the tree, (Ṙ, ω̄, ṗ) of all bodies."""
-    B = np.zeros((len(q), mechanism.n_v, tree.n_v))
+def maps(tree, q):
+    """Of each body B (T, 6 + n, n_v): by v of the tree, (Ṙ, ω̄, ṗ)."""
+    found = []
     for node, frame in zip(tree.nodes, tree_oracle.frames(tree, q), strict=True):
-        own = B[:, mechanism.columns(node.body.name)]
-        own[:, :3], own[:, 3:6] = frame.L[:, :3], np.swapaxes(frame.F, 1, 2) @ frame.L[:, 3:]
-        own[:, 6:, node.p_v] = np.eye(node.body.n_modes)
-    return B
+        of_modes = np.zeros((len(q), node.body.n_modes, tree.n_v))
+        of_modes[:, :, node.p_v] = np.eye(node.body.n_modes)
+        found.append(np.concatenate([frame.L[:, :3], frame.F.swapaxes(1, 2) @ frame.L[:, 3:], of_modes], axis=1))
+    return found
 
 
-def absolute_states(mechanism, state):
-    """`Absolute` of each of the states."""
-    for k, B in enumerate(of_bodies(mechanism, state.tree, state.q)):
-        q = np.zeros(mechanism.n_q)
-        for node, frame in zip(state.tree.nodes, state.frames, strict=True):
-            R, e, p = mechanism.parts(q, node.body.name)
-            R[:], e[:], p[:] = frame.r[k], quaternion(frame.F[k]), state.q[k, node.p_q]
-        yield Absolute(q, B @ state.v[k], B)
+def rates(tree, q, v):
+    """B v (T, 6 + n) of each body."""
+    return [np.einsum("tij,tj->ti", B, v) for B in maps(tree, q)]
 
 
-def absolute_accelerations(mechanism, state) -> Array:
-    """V̇ (T, N) of all bodies: B v̇ + Ḃ v."""
+def accelerations_of_bodies(state):
+    """(R̈, ω̄̇, p̈) (T, 6 + n) of each body: B v̇ + Ḃ v."""
+    tree, sizes = state.tree, [6 + node.body.n_modes for node in state.tree.nodes]
+    slopes = tree_oracle.rate(lambda q, _: np.hstack(rates(tree, q, state.v)), tree, state.q, state.v)
+    of_each = np.split(slopes, np.cumsum(sizes)[:-1], axis=1)
+    return [x + slope for x, slope in zip(rates(tree, state.q, state.a), of_each, strict=True)]
 
-    def velocities(q, _):
-        return np.einsum("tij,tj->ti", of_bodies(mechanism, state.tree, q), state.v)
 
-    B = of_bodies(mechanism, state.tree, state.q)
-    return np.einsum("tij,tj->ti", B, state.a) + tree_oracle.rate(velocities, state.tree, state.q, state.v)
+def required_by_bodies(state, gravity):
+    """M v̇ − Q (T, 6 + n) of each body by itself."""
+    found, moving = [], rates(state.tree, state.q, state.v)
+    of_all = zip(state.tree.nodes, state.frames, moving, accelerations_of_bodies(state), strict=True)
+    for node, frame, *of_body in of_all:
+        states = zip(frame.F, state.q[:, node.p_q], *of_body, strict=True)
+        found.append([
+            body_mass_matrix(node.body, A, p) @ a - forces_on_body(node.body, A, p, v, gravity) for A, p, v, a in states
+        ])  # fmt: skip
+    return [np.array(one) for one in found]
 
 
 def gear_forces(tree, q, v):
@@ -123,13 +115,12 @@ def gear_forces(tree, q, v):
 
 def required_forces(model, state, times):
     """M v̇ − Q (T, n_v) along v: what gravity, elasticity, friction and given loads leave for others to supply."""
-    mechanism = mechanism_of(state.tree, model.scene.gravity)
-    accelerations = absolute_accelerations(mechanism, state)
-    found = resistance(model, state.q, state.v) - given_forces(model, state.q, state.frames, times)
-    found += rotor_forces(state.tree, state.q, state.v, state.a) - gear_forces(model.tree, state.q, state.v)
-    for k, (at, a) in enumerate(zip(absolute_states(mechanism, state), accelerations, strict=True)):
-        found[k] += at.B.T @ (mechanism.mass_matrix(at.q) @ a - mechanism.forces(at.q, at.v))
-    for node in state.tree.nodes:
+    tree, q, v = state.tree, state.q, state.v
+    found = resistance(model, q, v) - given_forces(model, q, state.frames, times)
+    found += rotor_forces(tree, q, v, state.a) - gear_forces(tree, q, v)
+    for B, needed in zip(maps(tree, q), required_by_bodies(state, np.array(model.scene.gravity)), strict=True):
+        found += np.einsum("tij,ti->tj", B, needed)
+    for node in tree.nodes:
         found[:, node.v] += rotor_mass(node) * state.a[:, node.v]
     return found
 
@@ -144,16 +135,9 @@ class BodyForces(NamedTuple):
 
 def body_forces(state: Accelerated, gravity) -> list[BodyForces]:
     """By which each body moves as it does."""
-    mechanism = mechanism_of(state.tree, gravity)
-    accelerations = absolute_accelerations(mechanism, state)
-    needed = np.array([
-        mechanism.mass_matrix(at.q) @ a - mechanism.forces(at.q, at.v)
-        for at, a in zip(absolute_states(mechanism, state), accelerations, strict=True)
-    ])  # fmt: skip
-    parts = [needed[:, mechanism.columns(node.body.name)] for node in state.tree.nodes]
     return [
         BodyForces(own[:, :3], np.einsum("tij,tj->ti", frame.F, own[:, 3:6]), own[:, 6:])
-        for own, frame in zip(parts, state.frames, strict=True)
+        for own, frame in zip(required_by_bodies(state, np.array(gravity)), state.frames, strict=True)
     ]
 
 
@@ -209,12 +193,14 @@ def gear_energy(tree, q: Array, v: Array) -> tuple[Array, Array]:
 def energies(motion) -> Energies:
     """Of all bodies and rotors; compliant gears store ½ k δ², and their motors turn as they have to."""
     motion = behind_gears(motion)
-    tree, model = motion.model.tree, motion.model
-    mechanism = mechanism_of(tree, model.scene.gravity)
-    found = [mechanism.energies(at.q, at.v) for at in absolute_states(mechanism, accelerated(motion))]
-    kinetic, strain, gravitational = np.array(found).T
+    tree, state, g = motion.model.tree, accelerated(motion), np.array(motion.model.scene.gravity)
+    found = np.zeros((3, len(motion.time)))
+    for node, frame, v in zip(tree.nodes, state.frames, rates(tree, state.q, state.v), strict=True):
+        states = zip(frame.r, frame.F, state.q[:, node.p_q], v, strict=True)
+        found += np.transpose([energies_of_body(node.body, *one, g) for one in states])
+    kinetic, strain, gravitational = found
     of_gears, dissipated = gear_energy(tree, motion.q, motion.v)
-    dissipated += np.sum(motion.v * resistance(model, motion.q, motion.v), axis=1)
+    dissipated += np.sum(motion.v * resistance(motion.model, motion.q, motion.v), axis=1)
     for of in rotors(tree, motion.q):
         kinetic += 0.5 * of.inertia * np.sum(of.by_v * motion.v, axis=1) ** 2
     for node in tree.nodes:
@@ -230,11 +216,9 @@ def momentum(motion) -> Momentum:
     tree, state, (linear, angular) = motion.model.tree, accelerated(motion), np.zeros((2, len(motion.time), 3))
     for of in rotors(tree, motion.q):
         angular += of.inertia * np.sum(of.by_v * motion.v, axis=1)[:, None] * of.at.F[:, :, 2]
-    mechanism = mechanism_of(tree, np.zeros(3))
-    for k, at in enumerate(absolute_states(mechanism, state)):
-        of_all = mechanism.mass_matrix(at.q) @ at.v
-        for node, frame in zip(tree.nodes, state.frames, strict=True):
-            along, about, _ = mechanism.rates(of_all, node.body.name)
-            linear[k] += along
-            angular[k] += frame.F[k] @ about + np.cross(frame.r[k], along)
+    for node, frame, v in zip(tree.nodes, state.frames, rates(tree, state.q, state.v), strict=True):
+        states = zip(frame.F, state.q[:, node.p_q], v, strict=True)
+        own = np.array([body_mass_matrix(node.body, A, p) @ of_body for A, p, of_body in states])
+        linear += own[:, :3]
+        angular += np.einsum("tij,tj->ti", frame.F, own[:, 3:6]) + np.cross(frame.r, own[:, :3])
     return Momentum(linear, angular)

@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+import tree_oracle
 from beam_links import beam_link, tube
-from body_equations import absolute_states, accelerated, mechanism_of
+from body_equations import maps
 from links import ANGLES, arm, arm_links, quintic
 from mechanisms import forward, pcid, relative, revolute
+from oracle_3d import body_mass_matrix
 from oracle_runs import evaluated, run
 from scipy.linalg import eigh, null_space
 
@@ -31,10 +33,9 @@ def test_vibrations_solve_the_linearised_equations():
     q = undeformed_posture(robot.model).q
     modes = vibrations_of(MultibodySystem(robot.model), 0.0, q)
     motion = evaluated(robot, 0.0, q, 0 * q).motion
-    mechanism, K = mechanism_of(robot.model.tree, np.zeros(3)), np.zeros((len(q), len(q)))
-    (state,) = absolute_states(mechanism, accelerated(motion))
-    M = state.B.T @ mechanism.mass_matrix(state.q) @ state.B
-    for node in robot.model.tree.nodes:
+    tree, M, K = robot.model.tree, *np.zeros((2, len(q), len(q)))
+    for node, frame, (B,) in zip(tree.nodes, tree_oracle.frames(tree, motion.q), maps(tree, motion.q), strict=True):
+        M += B.T @ body_mass_matrix(node.body, frame.F[0], q[node.p_q]) @ B
         K[node.p_v, node.p_v] = np.diag(node.body.stiffness)
     free = null_space(constraint_rows(motion)[1][0])
     squares = eigh(free.T @ K @ free, free.T @ M @ free, eigvals_only=True)

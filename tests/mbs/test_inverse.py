@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 import tree_oracle
 from body_equations import (
-    absolute_accelerations,
     accelerated,
+    accelerations_of_bodies,
     body_forces,
     energies,
-    mechanism_of,
     momentum,
     required_forces,
 )
@@ -85,8 +84,7 @@ def check_points(motion):
     """All that acts at the points of a body moves it, and its frame and modes as they do."""
     tree, state = motion.model.tree, accelerated(motion)
     of_bodies = body_forces(state, motion.model.scene.gravity)
-    mechanism = mechanism_of(tree, np.zeros(3))
-    of_all = absolute_accelerations(mechanism, state)
+    of_all = accelerations_of_bodies(state)
     for number, (node, expected) in enumerate(zip(tree.nodes, of_bodies, strict=True)):
         force, moment = 0.0, 0.0
         for section, acting in acting_forces(motion).at_points[number]:
@@ -99,7 +97,7 @@ def check_points(motion):
         modal = acting_forces(motion).found.modal[:, node.p_v]
         np.testing.assert_allclose(modal, expected.modal, rtol=0, atol=1e-12 * np.abs(expected.modal).max(initial=1.0))
         of_body = acting_forces(motion).of_body(number)
-        a, alpha, _ = np.split(of_all[:, mechanism.columns(node.body.name)], [3, 6], axis=1)
+        a, alpha, _ = np.split(of_all[number], [3, 6], axis=1)
         alpha = np.einsum("tij,tj->ti", tree_oracle.frames(motion.model.tree, motion.q)[number].F, alpha)
         for found, wanted in ((of_body.a, a), (of_body.alpha, alpha)):
             np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-11 * np.abs(wanted).max(initial=1.0))
