@@ -272,29 +272,12 @@ def solved(ffrobot, shared_folder, tmp_path_factory):
     return solve
 
 
-@pytest.fixture(scope="session")
-def two_link(solved):
-    return solved("two_link")
+def _case(name):
+    return pytest.fixture(scope="session", name=name)(lambda solved: solved(name))
 
 
-@pytest.fixture(scope="session")
-def slider_crank(solved):
-    return solved("slider_crank")
-
-
-@pytest.fixture(scope="session")
-def arm_3r(solved):
-    return solved("arm_3r")
-
-
-@pytest.fixture(scope="session")
-def slider_crank_3d(solved):
-    return solved("slider_crank_3d")
-
-
-@pytest.fixture(scope="session")
-def slewing_appendage(solved):
-    return solved("slewing_appendage")
+two_link, arm_3r, slewing_appendage = (_case(name) for name in ("two_link", "arm_3r", "slewing_appendage"))
+slider_crank, slider_crank_3d = (_case(name) for name in ("slider_crank", "slider_crank_3d"))
 
 
 @pytest.fixture

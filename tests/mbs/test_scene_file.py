@@ -146,13 +146,11 @@ def test_waypoints_replace_expressions(folder):
 # What is replaced in the scene, by what, and the start of the line (after "scene.toml: ") that tells about it.
 # ruff: noqa: E501 (one line for each mistake)
 MISTAKES = [
-    ("gravity", "gravty", "gravty: expected one of the keys name, space, gravity, ", '(did you mean "gravity"?)'),
     ("[0.0, -9.81]", "[0.0, nan]", "gravity[1]: expected a finite number, found ", ""),
     ("[0.0, -9.81]", "[0, 0, -9.81]", "gravity: expected at most 2 entries, found [0, 0, -9.81]", ""),
     ('"planar"', '"plane"', 'space: expected "planar" or "spatial", found "plane"', '"planar"?'),
     ("[initial]", "[[initial]]", "initial: expected a table, found [", ""),
     # bodies
-    ('"link1.toml"', '"lnk1.toml"', 'body "link1": link: expected an existing file, found "lnk1.toml"', '"link1.toml"?'),
     ('link = "link1.toml"', "", 'body "link1": expected exactly one of the keys "link", "modal", "rigid", found none', ""),
     ("modal =", 'link = "link1.toml"\nmodal =', 'body "link2": expected exactly one of', 'found "link", "modal"'),
     ("mass = 2", "mass = -2", 'body "hand": rigid.mass: expected a number greater than 0, found -2', ""),
@@ -211,7 +209,6 @@ MISTAKES = [
     # patches and loads
     ("count = 2", "centers = []", 'pzt "link1": centers: expected at least one entry, found none', ""),
     ("d31 = 110e-12", "d31 = 0", 'pzt "link1": expected a d31 other than 0, found 0', ""),
-    ('body = "link1"', 'body = "hand"', 'pzt "hand": body: expected a flexible body, found "hand"', "rigid"),
     ('pzt = "link1"', 'pzt = "link2"', 'load no. 1: pzt: expected one of the layouts "link1", found "link2"', ""),
     ('["10*t", 5]', '["10*t", "v"]', "load no. 1: voltage[1]: expected an expression in t, found 'v'", "unknown name"),
     ('pzt = "link1"', 'joint = "O"', 'load no. 1: expected the keys "moment" with "joint", found "voltage"', ""),
@@ -219,10 +216,8 @@ MISTAKES = [
     ('voltage = ["10*t", 5]', 'mz = "t"', "load no. 1: mz: expected one of the keys point, joint, pzt, x, y, moment, ", ""),
     ("mass = 0.5", "", "payload no. 1: mass: expected a value, since this key is required, found none", ""),
     # analyses
-    ("end = 1.0", "end = 1.0005", 'analysis "inverse": expected an output_step that divides end = 1.0005', "found 0.001"),
     ("end = 1.0", "end = 1e9", 'analysis "inverse": expected at most 10000000 outputs, found', ""),
     ("end = 1.0", "", 'analysis "inverse": expected the key "end" in kind = "pcid", found none', ""),
-    ("end = 1.0", "end = 1.0\ntolerance = 0", 'analysis "inverse": tolerance: expected a number of at least 1e-10', "found 0"),
     ("end = 1.0", "end = 1.0\nspectral_radius = 0.5", 'analysis "inverse": expected the key "spectral_radius" only with', ""),
     ("end = 1.0", 'end = 1.0\nintegrator = "generalized-alpha"', 'analysis "forward": actuation: expected an analysis', "reproducible steps"),
     ("end = 1.0", 'end = 1.0\nshape = "zero"', 'analysis "inverse": expected the key "shape" only in kind = "fcid"', "found"),
