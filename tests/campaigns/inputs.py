@@ -1,12 +1,12 @@
-"""Meshes, motions, tables, HDF5 files, arguments of studies, one change each: refused, or taken.
+"""Meshes, motions, tables, controllers, arguments of studies, one change each: refused, or taken.
 
     python tests/campaigns/inputs.py [--count 100] [--seed 0] [--kind KIND …] [--record]
 
-Kinds are skin, mesh, motion, bag, csv, modal, results, bytes, study, catalog and controller.
+Kinds are skin, mesh, motion, bag, csv, study, catalog and controller.
 
-Run by hand, some 0.3 s each. Attributes, cells and datasets get values of other types, huge, tiny, not finite, empty,
-names that lead elsewhere, and text that programs would run: a file CANARY must not appear, nor anything beside the
-folder. Commands run as in mutations.py. Exit code 1 where anything fell over.
+Run by hand, some 0.3 s each. Cells and arguments get values of other types, huge, tiny, not finite, empty, names that
+lead elsewhere, and text that programs would run: a file CANARY must not appear, nor anything beside the folder.
+Commands run as in mutations.py. Exit code 1 where anything fell over.
 """
 
 import os
@@ -19,16 +19,13 @@ from pathlib import Path
 
 sys.path.append(str(Path(__file__).parents[1] / "mesh"))
 import gmsh
-import h5py
 import meshio
-import numpy as np
 import trimesh
 from decks import bar, elements, fixed, free, nodes, tetrahedra
 from forked_command import BAD, outcome, run
 from hostile import Damage
 from record import options, record
 
-from ffrobot.common.checksum import seal
 from ffrobot.mesh.gmsh_session import gmsh_session
 
 NUMBERS = tuple(
@@ -72,8 +69,7 @@ CATALOG = """name, rated_torque, peak_torque, max_speed, rotor_inertia, gear_rat
 M30, 0.10, 0.30, 630, 0.3e-5, 50 80 100, 0.8, 0.5
 M60, 2.0, 6.0, 630, 1e-5, , , 0.8
 """
-CONTROLLER = """import numpy as np
-
+CONTROLLER = """
 
 def law(setup):
     def at(k, y):
@@ -191,54 +187,6 @@ class Campaign:
         (self.place / "path.csv").write_bytes(self.draw.choice(("\n", "\r\n")).join(lines).encode(encoding))
         return f"{how} {lines[row]!r} {encoding}", "path.csv", [["solve", "scene.toml"]]
 
-    def modal(self):
-        label = self.damaged(self.place / "arm.h5")
-        os.utime(self.place / "arm.toml", (0, 0))
-        commands = [["info", "arm.h5"], ["export", "arm.h5", "--format", self.draw.choice(("sid", "mbdyn", "exudyn"))]]
-        return label, "arm.h5", commands
-
-    def results(self):
-        label, name = self.damaged(self.place / "scene.results.h5"), "scene.results.h5"
-        reads = [["info", name], ["feasibility", name], ["export", name, "--format", "csv"], ["linear", name],
-                 ["report", name], ["plot", name, "--format", "svg"]]  # fmt: skip
-        return label, name, self.draw.sample(reads, 2)
-
-    def damaged(self, path: Path) -> str:
-        """One dataset or attribute is another; the checksum fits again."""
-        value = self.draw.choice((1e300, np.nan, np.inf, -1, 0, 1j, "text", b"\xff", [], [[[1.0]]], 2**62))
-        with h5py.File(path, "a") as file:
-            names = list[str]()
-            file.visit(names.append)
-            name = self.draw.choice(names)
-            item = file[name]
-            if self.draw.random() < 0.3:
-                owner = file if self.draw.random() < 0.5 or not item.attrs else item
-                name = f"{name} @ {(key := self.draw.choice(list(owner.attrs)))}"
-                owner.attrs[key] = self.draw.choice(TEXTS).replace("\0", "") if self.draw.random() < 0.5 else value
-            elif self.draw.random() < 0.3:
-                end = self.draw.choice([end for end in ("..", "=x", "a b", "関", "tip") if end not in item.parent])
-                file.move(name, f"{name[: name.rfind('/') + 1]}{end}")
-            elif isinstance(item, h5py.Dataset) and item.shape and not isinstance(value, str | bytes | list):
-                content = np.array(item[()], dtype=complex if value == 1j else None)
-                if content.dtype.kind in "fc":
-                    content.flat[self.draw.randrange(max(content.size, 1)) if content.size else slice(0)] = value
-                del file[name]
-                file[name] = content
-            else:
-                del file[name]
-                file[name] = value
-        seal(path)
-        return f"{name} = {value!r}"
-
-    def bytes(self):
-        """Of HDF5 files: what its library does with them."""
-        name = self.draw.choice(("arm.h5", "scene.results.h5"))
-        label = self.of_bytes(self.place / name)
-        if self.draw.random() < 0.7:
-            seal(self.place / name)
-        os.utime(self.place / "arm.toml", (0, 0))
-        return f"{name} {label}", name, [["info", name], ["solve", "scene.toml"]]
-
     def catalog(self):
         (self.place / "motors.csv").write_text(CATALOG, encoding="utf-8")
         how = self.of_bytes(self.place / "motors.csv")
@@ -272,9 +220,7 @@ class Campaign:
         return " ".join(command), "scene.toml", [command]
 
 
-KINDS = (
-    "skin", "mesh", "motion", "bag", "csv", "modal", "results", "bytes", "study", "catalog", "controller",
-)  # fmt: skip
+KINDS = ("skin", "mesh", "motion", "bag", "csv", "study", "catalog", "controller")
 
 
 def main() -> None:
