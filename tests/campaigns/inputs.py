@@ -1,12 +1,12 @@
-"""Meshes, motions, tables, controllers, arguments of studies, one change each: refused, or taken.
+"""Meshes, motions, tables and controllers, one change each: refused, or taken.
 
     python tests/campaigns/inputs.py [--count 100] [--seed 0] [--kind KIND …] [--record]
 
-Kinds are skin, mesh, motion, bag, csv, study, catalog and controller.
+Kinds are skin, mesh, motion, bag, csv, catalog and controller.
 
-Run by hand, some 0.3 s each. Cells and arguments get values of other types, huge, tiny, not finite, empty, names that
-lead elsewhere, and text that programs would run: a file CANARY must not appear, nor anything beside the folder.
-Commands run as in mutations.py. Exit code 1 where anything fell over.
+Run by hand, some 0.3 s each. Cells get values of other types, huge, tiny, not finite, empty, names that lead elsewhere,
+and text that programs would run: a file CANARY must not appear, nor anything beside the folder. Commands run as in
+mutations.py. Exit code 1 where anything fell over.
 """
 
 import os
@@ -132,7 +132,7 @@ class Campaign:
         label, name, commands = getattr(self, kind)()
         for command in commands:
             code, told = run(command, self.place)
-            found = outcome(code, told, [name, "scene.toml", *(["expected"] if kind == "study" else [])])
+            found = outcome(code, told, [name, "scene.toml"])
             canary = kind != "controller" and (self.place / "CANARY").exists()
             if canary or os.listdir(self.place.parent) != ["try"]:
                 found = "crash"
@@ -204,23 +204,8 @@ class Campaign:
         (self.place / "scene.toml").write_text(SCENE.strip().removesuffix("]") + LOOP, encoding="utf-8")
         return how, "law.py", [["solve", "scene.toml"]]
 
-    def study(self):
-        arm = "links.arm.geometry.section.outer"
-        keys = ("payload.0.mass", arm, "links.arm.x", "gravity.1", "body.arm.link", "..", "links..", "x")
-        values = ("0.1,0.2", "0.1:0.2:2", "1:2:1e9", "a:b:c", "0.1", "=1", "1e400", "-1,1", "in {1:2}", *TEXTS)
-        goals = ("peak joints.shoulder.moment", *TEXTS)
-        key, value, of = (self.draw.choice(texts).replace("\0", "") for texts in (keys, values, goals))
-        commands = [
-            ["sweep", "scene.toml", f"--vary={key}={value}", "-o", "output"],
-            ["sensitivity", "scene.toml", f"--of={of}", f"--to={key}", "-o", "output"],
-            ["optimise", "scene.toml", f"--minimise={of}", f"--vary={key}={value}", "--runs", "2", "-o", "output"],
-            ["uncertainty", "scene.toml", f"--of={of}", f"--spread={key}={value}", "--samples", "2", "-o", "output"],
-        ]  # fmt: skip
-        command = self.draw.choice(commands)
-        return " ".join(command), "scene.toml", [command]
 
-
-KINDS = ("skin", "mesh", "motion", "bag", "csv", "study", "catalog", "controller")
+KINDS = ("skin", "mesh", "motion", "bag", "csv", "catalog", "controller")
 
 
 def main() -> None:
@@ -237,7 +222,7 @@ def main() -> None:
         print(f"{name}: {count}")
     if asked.record:
         found = ", ".join(f"{name} {count}" for name, count in sorted(campaign.counts.items()))
-        record("inputs", tried=f"{asked.count} changed files and arguments", found=found)
+        record("inputs", tried=f"{asked.count} changed files", found=found)
     sys.exit(1 if campaign.bad else 0)
 
 

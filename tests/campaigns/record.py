@@ -2,7 +2,7 @@
 
 A campaign (a script in this folder, run by hand with seeds of its own) takes an option `--record` and ends with
 
-    record("inputs", tried="300 changed files and arguments", found="bag: rejected 27, …")
+    record("inputs", tried="300 changed files", found="bag: rejected 27, …")
 
 Counts belong into both texts. The table of the page then takes it in with `python tests/campaigns/record.py`, which
 reads all files in `records/`; both are committed. A campaign of several parts has a name for each: "tolerance-radau".
