@@ -6,6 +6,7 @@ import resource
 import signal
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 sys.path.append(str(Path(__file__).parents[1]))
@@ -45,3 +46,24 @@ def outcome(code: int, told: str, files: list[str]) -> str:
     if not lines[0].startswith("ffrobot: "):
         return "noise"
     return "rejected" if code == 2 else "stopped"
+
+
+class Outcomes:
+    """Counts of what became of commands, and what is to be mended."""
+
+    def __init__(self) -> None:
+        self.counts, self.bad = Counter[str](), list[str]()
+
+    def add(self, what: str, kind: str, label: str, code: int, told: str) -> str:
+        """Count `what` became of a command, and show it where that is bad."""
+        self.counts[f"{what}: {kind}"] += 1
+        if kind in BAD:
+            lines = told.strip().splitlines()
+            shown = " | ".join(lines[-3:] if kind == "traceback" else lines[:3])
+            self.bad.append(f"{kind}, {what}, exit code {code}: {label}: {shown[:600]}")
+            print(self.bad[-1], flush=True)
+        return kind
+
+    def show(self) -> None:
+        for name, count in sorted(self.counts.items()):
+            print(f"{count:6d} {name}")

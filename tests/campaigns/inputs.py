@@ -14,7 +14,6 @@ import random
 import shutil
 import sys
 import tempfile
-from collections import Counter
 from pathlib import Path
 
 sys.path.append(str(Path(__file__).parents[1] / "mesh"))
@@ -22,7 +21,7 @@ import gmsh
 import meshio
 import trimesh
 from decks import bar, elements, fixed, free, nodes, tetrahedra
-from forked_command import BAD, outcome, run
+from forked_command import Outcomes, outcome, run
 from hostile import Damage
 from record import options, record
 
@@ -94,7 +93,7 @@ TABLE = "t,value\n0,0\n0.02,0.1\n0.04,0.15\n0.06,0.2\n"
 
 class Campaign:
     def __init__(self, folder: Path, seed: int) -> None:
-        self.draw, self.counts, self.bad = random.Random(seed), Counter[str](), list[str]()
+        self.draw, self.found = random.Random(seed), Outcomes()
         self.place, self.ready = folder / "place" / "try", folder / "ready"
         os.environ["XDG_CACHE_HOME"] = str(folder / "cache")
         self.ready.mkdir()
@@ -132,16 +131,11 @@ class Campaign:
         label, name, commands = getattr(self, kind)()
         for command in commands:
             code, told = run(command, self.place)
-            found = outcome(code, told, [name, "scene.toml"])
+            kind_of_end = outcome(code, told, [name, "scene.toml"])
             canary = kind != "controller" and (self.place / "CANARY").exists()
             if canary or os.listdir(self.place.parent) != ["try"]:
-                found = "crash"
-            self.counts[f"{kind}: {found}"] += 1
-            if found in BAD:
-                self.bad.append(
-                    f"{number} {kind} {found} {command[0]}, exit code {code}: {label}: {told.strip()[-500:]}"
-                )
-                print(self.bad[-1], flush=True)
+                kind_of_end = "crash"
+            self.found.add(kind, kind_of_end, f"{number} {command[0]} {label}", code, told)
 
     def skin(self):
         """A mesh that a robot shows, and whose filled volume can be its mass."""
@@ -218,12 +212,11 @@ def main() -> None:
         campaign = Campaign(Path(folder), asked.seed)
         for number in range(asked.count):
             campaign.one(kinds[number % len(kinds)], number)
-    for name, count in sorted(campaign.counts.items()):
-        print(f"{name}: {count}")
+    campaign.found.show()
     if asked.record:
-        found = ", ".join(f"{name} {count}" for name, count in sorted(campaign.counts.items()))
+        found = ", ".join(f"{name} {count}" for name, count in sorted(campaign.found.counts.items()))
         record("inputs", tried=f"{asked.count} changed files", found=found)
-    sys.exit(1 if campaign.bad else 0)
+    sys.exit(bool(campaign.found.bad))
 
 
 if __name__ == "__main__":

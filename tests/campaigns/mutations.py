@@ -1,6 +1,6 @@
 """Every key of every case, and of scenes in 3D, with hostile values: what is solved, refused, or falls over.
 
-    python tests/campaigns/mutations.py [--count 100] [--seed 0] [--case NAME …] [--folder FOLDER] [--record]
+    python tests/campaigns/mutations.py [--count 100] [--seed 0] [--case NAME …] [--record]
 
 Run by hand, about half a second each. Every scene is cut short, and its scene, link or figure file changed in one
 place: values of other types, huge, tiny, not finite, empty, nested, with markup and line breaks, keys removed, added,
@@ -17,12 +17,12 @@ import tempfile
 import tomllib
 from collections import Counter
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import tomli_w
-from forked_command import BAD, GOOD, outcome, run
+from forked_command import BAD, GOOD, Outcomes, outcome, run
 from hostile import Mutator, known_keys, places
 from record import options, record
 
@@ -40,14 +40,6 @@ class Case:
     name: str
     folder: Path
     files: list[Path]
-
-
-@dataclass
-class Found:
-    """Counts of outcomes, and what is to be mended."""
-
-    counts: Counter[str] = field(default_factory=Counter)
-    bad: list[str] = field(default_factory=list)
 
 
 def shortened(scene: dict[str, Any]) -> dict[str, Any]:
@@ -69,17 +61,16 @@ def shortened(scene: dict[str, Any]) -> dict[str, Any]:
 
 class Campaign:
     def __init__(self, folder: Path, seed: int, cases: list[str] | None = None) -> None:
-        self.folder, self.chance, self.found = folder, random.Random(seed), Found()
+        self.folder, self.chance, self.found = folder, random.Random(seed), Outcomes()
         os.environ["XDG_CACHE_HOME"] = str(folder / "cache")
         for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
             os.environ[name] = "1"
         ready = folder / "ready"
-        if not ready.exists():
-            shutil.copytree(CASES, ready, ignore=shutil.ignore_patterns("*.h5", "figures", "README.md"))
-            for name in IN_SPACE:
-                folder = ready / f"checkpoint_{name}"  # cases may have the same name
-                shutil.copytree(CHECKPOINTS / "links", folder / "links")
-                shutil.copy(CHECKPOINTS / f"{name}.toml", folder / "scene.toml")
+        shutil.copytree(CASES, ready, ignore=shutil.ignore_patterns("*.h5", "figures", "README.md"))
+        for name in IN_SPACE:
+            case = ready / f"checkpoint_{name}"  # cases may have the same name
+            shutil.copytree(CHECKPOINTS / "links", case / "links")
+            shutil.copy(CHECKPOINTS / f"{name}.toml", case / "scene.toml")
         names = sorted(path.parent.name for path in ready.glob("*/scene.toml"))
         self.cases = [self.prepared(ready / name) for name in names if cases is None or name in cases]
         keys = {
@@ -95,15 +86,12 @@ class Campaign:
     def prepared(self, folder: Path) -> Case:
         """Cut short, its links in the cache."""
         scene = folder / "scene.toml"
-        is_new = not (folder / "ready").exists()
         data = shortened(tomllib.loads(scene.read_text(encoding="utf-8")))
         scene.write_text(tomli_w.dumps(data), encoding="utf-8")
         links = {folder / body["link"] for body in data["body"] if isinstance(body.get("link"), str)}
         files = [scene, *sorted(path.resolve() for path in links), *folder.glob("figures.toml")]
-        if is_new:
-            code, told = run(["solve", "scene.toml", "-o", "scene.results.h5"], folder)
-            (folder / "ready").touch()
-            print(f"{folder.name}: exit code {code} {told.strip()[:200]}", flush=True)
+        code, told = run(["solve", "scene.toml", "-o", "scene.results.h5"], folder)
+        print(f"{folder.name}: exit code {code} {told.strip()[:200]}", flush=True)
         return Case(folder.name, folder, files)
 
     def one(self, number: int) -> None:
@@ -148,35 +136,21 @@ class Campaign:
 
     def command(self, arguments: list[str], folder: Path, label: str, files: list[str]) -> str:
         code, told = run(arguments, folder)
-        kind = outcome(code, told, files)
-        self.found.counts[f"{arguments[0]}: {kind}"] += 1
-        if kind in BAD:
-            lines = told.strip().splitlines()
-            shown = " | ".join(lines[-3:] if kind == "traceback" else lines[:3])
-            self.found.bad.append(f"{kind}, {arguments[0]}, exit code {code}: {label}: {shown[:600]}")
-            print(self.found.bad[-1], flush=True)
-        return kind
-
-
-def campaign(seed: int, count: int, cases: list[str] | None = None, folder: Path | None = None) -> Found:
-    """`count` changes drawn with `seed`; all cases, or those named."""
-    with tempfile.TemporaryDirectory() as temporary, suppress(KeyboardInterrupt):
-        runs = Campaign(folder or Path(temporary), seed, cases)
-        print(f"{len(runs.turns)} keys", flush=True)
-        for number in range(count):
-            runs.one(number)
-    return runs.found
+        return self.found.add(arguments[0], outcome(code, told, files), label, code, told)
 
 
 def main() -> None:
     """Prints what was found."""
     parser = options(__doc__, count=100, seed=0)
     parser.add_argument("--case", action="append", help="only this one; repeatable")
-    parser.add_argument("--folder", type=Path, help="where the cases and their links, ready for use, are and stay")
     asked = parser.parse_args()
-    found = campaign(asked.seed, asked.count, asked.case, asked.folder)
-    for kind, number in sorted(found.counts.items()):
-        print(f"{number:6d} {kind}")
+    with tempfile.TemporaryDirectory() as folder, suppress(KeyboardInterrupt):
+        runs = Campaign(Path(folder), asked.seed, asked.case)
+        print(f"{len(runs.turns)} keys", flush=True)
+        for number in range(asked.count):
+            runs.one(number)
+    found = runs.found
+    found.show()
     if asked.record:
         kinds = Counter({kind: 0 for kind in (*BAD, *GOOD)})
         for key, number in found.counts.items():
