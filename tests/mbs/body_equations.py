@@ -125,20 +125,15 @@ def required_forces(model, state, times):
     return found
 
 
-class BodyForces(NamedTuple):
-    """Force (T, 3), moment about the frame's origin (T, 3) and modal forces (T, n), beside gravity and elasticity."""
+def body_forces(state: Accelerated, gravity) -> list[Array]:
+    """By which each body moves as it does, beside gravity and elasticity.
 
-    force: Array
-    moment: Array
-    modal: Array
-
-
-def body_forces(state: Accelerated, gravity) -> list[BodyForces]:
-    """By which each body moves as it does."""
-    return [
-        BodyForces(own[:, :3], np.einsum("tij,tj->ti", frame.F, own[:, 3:6]), own[:, 6:])
-        for own, frame in zip(required_by_bodies(state, np.array(gravity)), state.frames, strict=True)
-    ]
+    (T, 6 + n): force, moment about the frame's origin, in global axes, and modal forces.
+    """
+    found = required_by_bodies(state, np.array(gravity))
+    for own, frame in zip(found, state.frames, strict=True):
+        own[:, 3:6] = np.einsum("tij,tj->ti", frame.F, own[:, 3:6])
+    return found
 
 
 def given_forces(model, q: Array, frames, times: Array) -> Array:

@@ -36,3 +36,14 @@ def moving(rng, types, kinds, loops=0):
         system.core.keep_independent_rows(q, v)
     a, multipliers = system.core.evaluate(q, v, np.zeros(len(model.rows)), None, None)
     return state_of(model, NOW, q[None], v[None], a[None], multipliers[None]), system
+
+
+def differences(function, n, h=1e-4):
+    """∂function/∂x (…, n) at x = 0 by differences of fourth order."""
+    columns = []
+    for k in range(n):
+        dx = np.zeros(n)
+        dx[k] = h
+        values = [function(s * dx) for s in (-2, -1, 1, 2)]
+        columns.append((values[0] - 8 * values[1] + 8 * values[2] - values[3]) / (12 * h))
+    return np.stack(columns, axis=-1)

@@ -86,18 +86,18 @@ def check_points(motion):
     of_bodies = body_forces(state, motion.model.scene.gravity)
     of_all = accelerations_of_bodies(state)
     for number, (node, expected) in enumerate(zip(tree.nodes, of_bodies, strict=True)):
-        force, moment = 0.0, 0.0
+        force, moment, frame = 0.0, 0.0, state.frames[number]
         for section, acting in acting_forces(motion).at_points[number]:
-            place = tree_oracle.motion(tree, section, motion.q, tree_oracle.frames(motion.model.tree, motion.q))
-            at_frame = acting.seen_from(place.r - tree_oracle.frames(motion.model.tree, motion.q)[number].r)
+            place = tree_oracle.motion(tree, section, motion.q, state.frames)
+            at_frame = acting.seen_from(place.r - frame.r)
             force, moment = force + at_frame.force, moment + at_frame.moment
-        size = np.abs(expected.force).max() + np.abs(expected.moment).max()
-        np.testing.assert_allclose(force, expected.force, rtol=0, atol=1e-11 * size)
-        np.testing.assert_allclose(moment, expected.moment, rtol=0, atol=1e-11 * size)
-        modal = acting_forces(motion).found.modal[:, node.p_v]
-        np.testing.assert_allclose(modal, expected.modal, rtol=0, atol=1e-12 * np.abs(expected.modal).max(initial=1.0))
+        wrench, modal = expected[:, :6], expected[:, 6:]
+        size = np.abs(wrench[:, :3]).max() + np.abs(wrench[:, 3:]).max()
+        np.testing.assert_allclose(np.hstack([force, moment]), wrench, rtol=0, atol=1e-11 * size)
+        found = acting_forces(motion).found.modal[:, node.p_v]
+        np.testing.assert_allclose(found, modal, rtol=0, atol=1e-12 * np.abs(modal).max(initial=1.0))
         of_body = acting_forces(motion).of_body(number)
         a, alpha, _ = np.split(of_all[number], [3, 6], axis=1)
-        alpha = np.einsum("tij,tj->ti", tree_oracle.frames(motion.model.tree, motion.q)[number].F, alpha)
+        alpha = np.einsum("tij,tj->ti", frame.F, alpha)
         for found, wanted in ((of_body.a, a), (of_body.alpha, alpha)):
             np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-11 * np.abs(wanted).max(initial=1.0))

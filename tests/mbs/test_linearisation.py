@@ -8,7 +8,7 @@ import pytest
 import zoo
 from links import arm, arm_links, ritz_link
 from mechanisms import make_model, pcid, revolute
-from moving_trees import moving
+from moving_trees import differences, moving
 from oracle_runs import run
 from random_mechanisms import TYPES
 from tree_oracle import row_values
@@ -28,17 +28,6 @@ KINDS = ("rigid", "solid", "beam", "supported beam", "stiffened solid", "stiffen
 def kinds_of(joint, loops=0):
     """Points of loops have no geometric stiffness."""
     return ("rigid", "beam") if joint == "free" else KINDS[:4] if loops else KINDS
-
-
-def differences(function, n, h=1e-4):
-    """∂function/∂x (…, n) at x = 0 by differences of fourth order."""
-    columns = []
-    for k in range(n):
-        dx = np.zeros(n)
-        dx[k] = h
-        values = [function(s * dx) for s in (-2, -1, 1, 2)]
-        columns.append((values[0] - 8 * values[1] + 8 * values[2] - values[3]) / (12 * h))
-    return np.stack(columns, axis=-1)
 
 
 @pytest.mark.parametrize("loops", [0, 1])

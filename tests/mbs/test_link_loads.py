@@ -31,7 +31,7 @@ def missing(outcome):
         if node.body.name not in [body.name for body in outcome.robot.bodies]:
             continue  # output of a rotor
         loads, p = loads_on_links(outcome.motion, [node.body.name])[node.body.name].sizes, motion.q[:, node.p_q]
-        whole, given = np.hstack(needed), 0.0
+        whole, given = needed, 0.0
         for point, at in node.body.points.items():
             force, moment = at_point(loads, point)
             of_frame = moment + np.cross(at.position + p @ at.translation.T, force)
