@@ -38,11 +38,21 @@ def cloud():
     return dataclasses.replace(body, damping_ratio=np.full(n, 0.02), family=("torsion",) * n)
 
 
+def bent(body):
+    """With nodes on the x axis to the middle, and beside it from there on."""
+
+    def moved(at):
+        beyond = np.maximum(at.position[..., :1] - 0.3, 0.0)
+        return dataclasses.replace(at, position=at.position + beyond * [0.0, 0.2, 0.0])
+
+    interfaces = {name: moved(at) for name, at in body.interfaces.items()}
+    return dataclasses.replace(body, stations=moved(body.stations), interfaces=interfaces)
+
+
 @pytest.fixture(scope="module")
 def bodies():
-    return {name: make_link(link).body for name, link in (("line", LINK), ("loaded", LOADED), ("held", HELD))} | {
-        "cloud": cloud()
-    }
+    made = {name: make_link(link).body for name, link in (("line", LINK), ("loaded", LOADED), ("held", HELD))}
+    return made | {"bent": bent(made["line"]), "cloud": cloud()}
 
 
 def differences(first, second, keys):
@@ -55,7 +65,7 @@ def differences(first, second, keys):
 
 
 @pytest.mark.parametrize("file_format", FORMATS)
-@pytest.mark.parametrize("name", ["line", "loaded", "held", "cloud"])
+@pytest.mark.parametrize("name", ["line", "loaded", "held", "bent", "cloud"])
 def test_there_and_back(file_format, name, bodies):
     write, read = FORMATS[file_format]
     body = bodies[name]
@@ -70,6 +80,8 @@ def test_there_and_back(file_format, name, bodies):
     for label, at in body.interfaces.items():
         for key, value in vars(at).items():
             np.testing.assert_array_equal(vars(back.interfaces[label])[key], value)
+    ends = [body.interfaces[name].position for name in ("root", "tip")]
+    np.testing.assert_array_equal(back.stations.position[[0, -1]], ends)
     assert back.reference_condition == body.reference_condition
     assert any("geometric stiffness" in line for line in left_out)
     assert any("not in the file" in line for line in remarks)

@@ -245,7 +245,10 @@ def modal_body(name: str, integrals: ShapeIntegrals, nodes: Nodes, text: str) ->
     nodes = {number: Interface(at.position, at.translation @ T, at.rotation @ T) for number, at in nodes.items()}
     interfaces = _interfaces(nodes, numbers)
     ends = [interfaces["root"], interfaces["tip"]]
-    length = float(np.linalg.norm(ends[1].position - ends[0].position))
+    span = ends[1].position - ends[0].position
+    length = float(span[0])
+    if length <= ON_AXIS * np.linalg.norm(span):
+        raise InputError("nodes: expected the tip at larger x than the root", "another place: turn the body's frame")
     sections = _section_inertia(integrals)
     S_bar_kl, S_spin = integrals.S_bar_kl, np.asarray(sections["S_spin"])
     # Families are those of the direction in which most of a mode's mass moves.
@@ -311,12 +314,10 @@ def _condition(interfaces: Mapping[str, Interface]) -> str:
 
 
 def _stations(nodes: Nodes, ends: list[Interface], length: float) -> Stations:
-    """The nodes on the line from root to tip, ascending in x; root and tip where the body lies otherwise."""
-    on_axis = [at for at in nodes.values() if np.abs(at.position[1:]).max() <= ON_AXIS * length]
-    points = sorted(on_axis if len(on_axis) > 1 else ends, key=lambda at: float(at.position[0]))
+    """The nodes on the x axis, ascending, where root and tip are on it, else these two."""
+    on_axis = [at for at in [*ends, *nodes.values()] if np.abs(at.position[1:]).max() <= ON_AXIS * length]
+    points = sorted(on_axis if on_axis[:2] == ends else ends, key=lambda at: float(at.position[0]))
     after = [b for a, b in pairwise(points) if b.position[0] - a.position[0] > ON_AXIS * length]
-    if not after:
-        raise InputError("nodes: expected root and tip at different x", "them at the same: turn the body's frame")
     return _stations_at([points[0], *after])
 
 
