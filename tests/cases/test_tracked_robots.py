@@ -6,8 +6,8 @@ import re
 import numpy as np
 import pytest
 from beam_links import link_keys, rectangle
-from tables_3d import ORIGIN, X, Z, joint, planar, rigid
 from tables_3d import pin as revolute
+from tables_3d import planar, rigid
 from tables_3d import scene as spatial
 
 import ffrobot
@@ -104,31 +104,6 @@ def five_bar():
     )  # fmt: skip
 
 
-def slider_crank():
-    """A soft crank about a slanted axis moves a slider beside it: a loop in 3D."""
-    T = 0.25
-    slanted = {  # about z of axes that the rotation vector (0.5, 0.2, 0) turns
-        "axis": [0.19047253607043549, -0.47618134017608871, 0.85847046790847781],
-        "rpy": [0.50643360053616981, 0.19164347241770835, 0.049733913986023531],
-    }
-    return scene(
-        T, [0.0, 0.0, -9.81], {"point": "slider.pin", "x": f"1.0 - 0.15*{septic(T)}"},
-        body=[
-            {"name": "crank", "link": strip(0.3, 0.004, 0.012, count=1)},
-            rigid("rod", 0.01, [2e-6, 1e-3, 1e-3], [0.55, 0.0, 0.0], tip=[1.1, 0.0, 0.0]),
-            rigid("slider", 0.05, [1e-4] * 3, pin=ORIGIN),
-        ],
-        joint=[
-            revolute("crank", "ground", "crank.root", motor=True, **slanted),
-            joint("fork", "universal", "crank.tip", "rod.root", axis=Z, second_axis=[0.0, -1.0, 0.0], motor=False),
-            joint("ball", "spherical", "rod.tip", "slider.pin"),
-            joint("guide", "prismatic", "ground", "slider.pin", at=[0.0, 0.075, 0.25], axis=X, motor=False),
-        ],
-        initial={"state": "static", "joints": {"crank": 1.2, "fork": [-1.4, 0.2]}},
-        pzt=[patches("crank", 0.012, 0.06)],
-    )  # fmt: skip
-
-
 def geared(tables, f, **inertias):
     """With gears of f Hz, rotors behind a ratio of 100 and 2 % of damping in joints with so much inertia, kg·m²."""
     for one in tables["joint"]:
@@ -148,10 +123,8 @@ ROBOTS = {
     "solid": lambda: in_plane(solid=True),
     "loop": five_bar,
     "3D, stiffening": lambda: in_3d(patch={"structural": ["stiffness"]}, geometric_stiffening=True),
-    "3D, loop": slider_crank,
     "gear": lambda: geared(in_plane(), 20, hub=0.05),
     "3D, gears": lambda: geared(in_3d(), 30, waist=0.05, shoulder=0.05),
-    "3D, loop, gear": lambda: geared(slider_crank(), 40, crank=0.01),
 }
 
 
