@@ -1,13 +1,13 @@
 """What `integrator = "auto"` costs against the best single integrator, over 36 varied runs.
 
-    python tests/campaigns/choice.py found.jsonl [--repeat 3] [--record]
+    python tests/campaigns/choice.py [--repeat 3]
 
-Runs that are in the file already are not made again. Times are those of the processor, the shortest of `--repeat`, or
-of as many more as two seconds allow, all integrators in turn. Evaluations are those of the equations of motion. A run
-by a single integrator ends with four times the evaluations of "auto", which always completes.
+Times are those of the processor, the shortest of `--repeat`, or of as many more as two seconds allow, all integrators
+in turn. Evaluations are those of the equations of motion. A run by a single integrator ends with four times the
+evaluations of "auto", which always completes. docs/benchmarks.md has a table of such runs.
 """
 
-import json
+import argparse
 import sys
 import time
 from pathlib import Path
@@ -19,7 +19,6 @@ sys.path += [str(Path(__file__).parents[1] / folder) for folder in ("mbs",)]
 from links import ANGLES, TIP, arm, arm_links, quintic, ritz_link
 from mechanisms import forward, make_model, pcid, revolute
 from oracle_runs import run
-from record import options, record
 
 from ffrobot.mbs.inversion.motors_only import MotorsOnly
 
@@ -162,33 +161,19 @@ def against_best(one):
 
 
 def main():
-    parser = options(__doc__, repeat=3)
-    parser.add_argument("file", type=Path, help="a JSON record per run; those in it are not run again")
-    asked = parser.parse_args()
-    text = asked.file.read_text() if asked.file.exists() else ""
-    records = [json.loads(line) for line in text.splitlines()]
-    known = {(one["run"], one["tolerance"]) for one in records}
-    with asked.file.open("a") as file:
-        for name, make, tolerances in runs():
-            wanted = [tolerance for tolerance in tolerances if (name, tolerance) not in known]
-            solved = make() if wanted else None
-            for tolerance in wanted:
-                records.append({"run": name, "tolerance": tolerance} | measured(solved, tolerance, asked.repeat))
-                file.write(json.dumps(records[-1]) + "\n")
-                file.flush()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--repeat", type=int, default=3)
+    asked, records = parser.parse_args(), []
+    for name, make, tolerances in runs():
+        solved = make()
+        for tolerance in tolerances:
+            records.append({"run": name, "tolerance": tolerance} | measured(solved, tolerance, asked.repeat))
+            print(name, tolerance, records[-1]["auto"], flush=True)
     print("\n".join(table(records)))
     times = sorted((against_best(one)[1], one["run"], one["tolerance"]) for one in records)
     median, (worst, of, tolerance) = times[len(times) // 2][0], times[-1]
     slow = sum(over > AIM for over, *_ in times)
-    found = (
-        f"{slow} above {AIM} times the best single one; median {median:.2f}, worst {worst:.2f} ({of}, {tolerance:g})"
-    )
-    print(found)
-    if asked.record:
-        tried = (
-            f'`integrator = "auto"` in {len(records)} runs: {", ".join(dict.fromkeys(one["run"] for one in records))}'
-        )
-        record("choice", tried=tried, found=f"time of the processor: {found}")
+    print(f"{slow} above {AIM} times the best single one; median {median:.2f}, worst {worst:.2f} ({of}, {tolerance:g})")
 
 
 if __name__ == "__main__":
