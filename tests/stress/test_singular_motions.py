@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from links import arm_links
-from mechanisms import make_model, relative, revolute
+from mechanisms import make_model
 from oracle_runs import joint_forces
 from robots import free_run, inverse, reaching, slider_crank, through_dead_centre
 from rods import rod
@@ -74,16 +73,6 @@ def test_starts_at_dead_centre():
         inverse(slider_crank(path, angle=0.0))
     for text in ("initial:", 'trajectory "slider"', "found a singular one"):
         assert text in str(raised.value)
-
-
-def test_welded_twice():
-    hinge = revolute("O", "ground", "link1.root")
-    welds = [{"name": name, "type": "weld", "between": ("link1.tip", "link2.root")} for name in ("W", "again")]
-    one, twice = (
-        free_run(make_model(arm_links(), joint=[hinge, *some]), end=0.1, tolerance=1e-8) for some in (welds[:1], welds)
-    )
-    twice.check_completed()
-    assert relative(twice.q, one.q) < 1e-6
 
 
 def test_welded_at_both_ends():
