@@ -4,8 +4,6 @@ import json
 from functools import cache
 from pathlib import Path
 
-from ffrobot.fe_models.link import cached_modal_body
-
 FOLDER = Path(__file__).parents[1] / "checkpoints" / "spatial"
 CASES = sorted(path.stem for path in FOLDER.glob("*.toml"))
 
@@ -13,8 +11,3 @@ CASES = sorted(path.stem for path in FOLDER.glob("*.toml"))
 @cache
 def load(name):
     return json.loads((FOLDER / f"{name}.json").read_text())
-
-
-@cache
-def modal_body(link):
-    return cached_modal_body(FOLDER / link).body

@@ -4,21 +4,26 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from checkpoint_mechanisms import modal_body
+from checkpoint_mechanisms import FOLDER
 from links import ritz_link
 from oracle_3d import body_mass_matrix
 from random_mechanisms import random_beam, stiffened
 
 from ffrobot.common.errors import InputError
 from ffrobot.common.rotations import exponential
+from ffrobot.fe_models.link import cached_modal_body
 from ffrobot.mbs.model.body import bent_section, from_modal_body
 from ffrobot.mbs.model.masses import with_payload
 from ffrobot.mbs.model.truncation import with_fewer_modes
 
 
+def upper():
+    return cached_modal_body(FOLDER / "links" / "upper.toml").body
+
+
 def test_straight_line_of_mass_has_inertia_about_its_axis():
     """J_11 = ρI_p l of a tube; twist couples with spin, and moves nothing along z."""
-    link = modal_body("links/upper.toml")
+    link = upper()
     body = from_modal_body("upper", link)
     I_p = np.pi / 32 * (0.011**4 - 0.009**4)
     assert body.inertia[0, 0] == pytest.approx(2700.0 * I_p * 0.7, rel=1e-12)
@@ -28,7 +33,7 @@ def test_straight_line_of_mass_has_inertia_about_its_axis():
 
 
 def test_beam_of_an_earlier_version_is_refused_with_the_way_out():
-    link = replace(modal_body("links/upper.toml"), J_spin=None, h_spin=None, S_spin=None)
+    link = replace(upper(), J_spin=None, h_spin=None, S_spin=None)
     with pytest.raises(InputError, match=r'body "upper": expected .* inertia of the beam .* with `ffrobot link`'):
         from_modal_body("upper", link)
     whole = replace(link, kind="solid")  # integrated over its volume: nothing is missing
@@ -39,7 +44,7 @@ def test_beam_of_an_earlier_version_is_refused_with_the_way_out():
 def test_payload_has_the_energy_of_a_body_on_the_section(center, bent):
     """½ m |v_c|² + ½ Ωᵀ J Ω more than without, at any velocity; a point mass at any deflection. Modes are uncoupled."""
     rng = np.random.default_rng(4)
-    bare = from_modal_body("upper", modal_body("links/upper.toml"))
+    bare = from_modal_body("upper", upper())
     center, J, m = np.array(center), np.diag([2e-3, 3e-3, 4e-3]) * (1.0 - bent), 0.6
     loaded = with_payload(bare, "tip", m, center, J)
     v, p = rng.standard_normal(6 + bare.n_modes), bent * rng.standard_normal(bare.n_modes)

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 import zoo
-from body_equations import energies
+from body_equations import energies, residuals
 from oracle_runs import evaluated, posture_of
-from prescribed_oracle import residuals
 
 from ffrobot.mbs.quantities.motion import constraint_violation
 from ffrobot.mbs.quantities.supply import totals

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 import tree_oracle
-from body_equations import accelerated, accelerations_of_bodies
+from body_equations import accelerated, accelerations_of_bodies, residuals
 from closed_chains import NOW, closed_chain, evaluated
 from equal_steps import controls
 from moving_trees import differences
-from prescribed_oracle import residuals
 from tree_oracle import row_values
 
 from ffrobot.mbs import _core

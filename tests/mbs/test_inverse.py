@@ -10,10 +10,10 @@ from body_equations import (
     energies,
     momentum,
     required_forces,
+    residuals,
 )
 from checkpoint_scenes import as_scene, tree_model
 from moving_trees import SMALL, state_of
-from prescribed_oracle import residuals
 from random_mechanisms import TYPES, random_tree
 
 from ffrobot.mbs import _core

@@ -7,10 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import tree_oracle
-from body_equations import Accelerated, required_forces
+from body_equations import Accelerated, Motor, required_forces, row_accelerations, unmet
 from closed_chains import closed_chain
 from moving_trees import SMALL, moving
-from prescribed_oracle import Motor, row_accelerations, unmet
 from random_mechanisms import TYPES
 from rotations import random_rotation
 from scipy.linalg import qr
