@@ -2,6 +2,7 @@
 
 import numpy as np
 import tables_3d
+from beam_links import beam_link, rectangle
 from scenes_in_3d import joint_keys, rigid_keys
 from tables_3d import Y, Z, revolute
 
@@ -84,4 +85,27 @@ def out_of_plane(value, *analyses, unit=1.0, **of_joints):
         bodies, [joint | of_joints.get(joint["name"], {}) for joint in joints], *analyses,
         gravity=[0.0, -9.81 * unit, 0.0], initial={"joints": {"A": 0.7, "B": [-0.4, 0.0], "D": 1.8}},
         trajectory=[{"name": "turn", "joint": "A", "value": value}],
+    )  # fmt: skip
+
+
+BAUCHAU = {"crank": (0.12, 16e-3), "coupler": (0.24, 16e-3), "rocker": (0.12, 8e-3)}  # length, side, m
+
+
+def bauchau(tilt, path, analysis, **of_links):
+    """Tables of four bars whose hinge C is tilted, so that rigid ones lock it: it moves as they bend.
+
+    Bauchau et al., Multibody Syst. Dyn. 37 (2016). Elastic bars, with more keys of beams.
+    """
+    links = {name: beam_link(length, rectangle(side, side), 8, **of_links) for name, (length, side) in BAUCHAU.items()}
+    axis = [0.0, -float(np.sin(tilt)), float(np.cos(tilt))]
+    joints = [
+        revolute("A", "ground", "crank.root", motor=True),
+        revolute("B", "crank.tip", "coupler.root", motor=False),
+        revolute("C", "coupler.tip", "rocker.root", axis, rpy=[0.0, 0.0, -np.pi / 2], motor=False),
+        revolute("D", "ground", "rocker.tip", at=[0.24, 0.0, 0.0], motor=False),
+    ]
+    return tables_3d.scene(
+        [{"name": name, "link": link} for name, link in links.items()], joints, analysis, gravity=[0.0, 0.0, 0.0],
+        initial={"joints": {"A": np.pi / 2, "B": -np.pi / 2, "C": 0.0, "D": -np.pi / 2}},
+        trajectory=[{"name": "turn", "joint": "A", "value": path}],
     )  # fmt: skip

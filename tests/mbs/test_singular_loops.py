@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from beam_links import beam_link, rectangle
+from four_bar import bauchau
 from tables_3d import pin, planar
 
 from ffrobot.common.errors import InputError
@@ -72,34 +72,18 @@ def test_a_parallelogram_that_falls_flat_stops_and_says_why(space, tolerance):
     assert run.statistics.time_reached == pytest.approx(float(np.sum(1 / rate) * (theta[1] - theta[0])), rel=5e-3)
 
 
-def bauchau(tilt, *more):
-    """Bauchau's four-bar (2016): its hinge at C is tilted, so that rigid links lock it; it moves as links bend."""
+TURN = {"name": "turn", "kind": "pcid", "end": 0.45, "output_step": 0.005}
 
-    def bar(length, side):
-        return beam_link(length, rectangle(side, side), 8, modes={"count": 3}, damping={"rayleigh": [0.0, 2e-5]})
 
-    bodies = [("ab", 0.12, 0.016), ("bc", 0.24, 0.016), ("cd", 0.12, 0.008)]
-    z, turned = {"axis": [0.0, 0.0, 1.0]}, {"rpy": [0.0, 0.0, -np.pi / 2]}
-    axis = {"axis": [float(np.sin(tilt)), 0.0, float(np.cos(tilt))]}
-    joints = [
-        {"name": "A", "between": ["ground", "ab.root"], **z},
-        {"name": "B", "between": ["ab.tip", "bc.root"], **z},
-        {"name": "C", "between": ["bc.tip", "cd.root"], **axis, **turned},
-        {"name": "D", "between": ["ground", "cd.tip"], "at": [0.24, 0.0, 0.0], **z, **turned},
-    ]
-    return make_scene(
-        name="bauchau", space="spatial", gravity=[0.0, 0.0, 0.0], geometric_stiffening=True,
-        body=[{"name": name, "link": bar(*of)} for name, *of in bodies],
-        joint=[joint | {"type": "revolute"} for joint in joints],
-        initial={"joints": {"A": np.pi / 2, "B": -np.pi / 2, "C": 0.0, "D": 0.0}},
-        trajectory=[{"name": "crank", "joint": "A", "value": "pi/2+4*t"}, *more],
-        analysis=[{"name": "turn", "kind": "pcid", "end": 0.45, "output_step": 0.005}],
-    )  # fmt: skip
+def driven(tilt, *more):
+    """Bauchau's four bars under paths, stiffened."""
+    tables = bauchau(tilt, "pi/2+4*t", TURN, modes={"count": 3}, damping={"rayleigh": [0.0, 2e-5]})
+    return make_scene(**tables | {"trajectory": [*tables["trajectory"], *more], "geometric_stiffening": True})
 
 
 def test_a_crank_drives_a_loop_that_only_bending_lets_move():
     """In line at 180 degrees branches meet: C comes to 90 degrees of the parallelogram, and then goes back."""
-    run = solve_scene(bauchau(np.deg2rad(5.0)), Watcher()).outcomes["turn"]
+    run = solve_scene(driven(np.deg2rad(5.0)), Watcher()).outcomes["turn"]
     crank, hinge = (run.q[:, run.model.columns(name)[0]] for name in "AC")
     np.testing.assert_allclose(crank, np.pi / 2 + 4 * run.time, atol=1e-9)
     assert np.abs(hinge - crank + np.pi / 2)[run.time < 0.3].max() < 0.02  # a parallelogram that bends a little
@@ -112,6 +96,6 @@ def test_a_crank_drives_a_loop_that_only_bending_lets_move():
 
 def test_two_cranks_of_a_loop_that_moves_are_still_too_many():
     """Without the tilt links need not bend: as many paths as the mechanism has freedoms, no more."""
-    scene = bauchau(0.0, {"name": "second", "joint": "B", "value": "-pi/2-4*t"})
+    scene = driven(0.0, {"name": "second", "joint": "B", "value": "-pi/2-4*t"})
     with pytest.raises(InputError, match="at most 1 components"):
         solve_scene(scene, Watcher())
