@@ -18,7 +18,8 @@ from record import options
 import ffrobot
 
 sys.path += [str(Path(__file__).parents[1] / folder) for folder in ("", "cases", "mbs")]
-from test_tracked_robots import ORIGIN, geared, in_3d, patches, revolute, scene, septic, strip
+from tables_3d import ORIGIN
+from test_tracked_robots import geared, in_3d, patches, revolute, scene, septic, strip
 
 
 def random_arm(rng, tolerance):
