@@ -146,7 +146,7 @@ def _length(value: float) -> str:
 class Remedies:
     """Single changes with which the patches suffice; infinite or 0 if there is none."""
 
-    limit: float  # largest voltage, V, of the patch that needs most
+    limit: float  # V, the largest required voltage
     layers: int  # number of layers of the same thickness, at the same voltage
     thickness: float  # of one layer, m, with the voltage raised in proportion (at the same field)
     count: int  # patches of the same size, evenly spread; 0 where no number with room suffices, or none are tried
@@ -254,12 +254,12 @@ def judge_patches(
         slew_limit=amplifiers.slew,
         current=current.max(axis=0, initial=0.0),
         current_limit=amplifiers.current,
-        field=required / layout.spacing,
+        field=np.abs(voltages.required).max(axis=0) / layout.spacing,
         limited_field=np.abs(voltages.within_limit).max(axis=0) / layout.spacing,
         strain=patches.effects.lever * (patches.effects.extent / 2 + layout.layers * layout.thickness) * curvature,
         mode_required=mode_required,
         mode_available=mode_available,
-        find_remedies=partial(_remedies, patches, required, limit, with_count),
+        find_remedies=partial(_remedies, patches, required / limit, voltages.largest, with_count),
     )
 
 
@@ -277,11 +277,11 @@ def worst(values: Array, range: Array) -> tuple[Array, Array]:
 
 
 def _remedies(
-    patches: PatchArray, required: Array, limit: Array, with_count: Callable[[int], float | None] | None
+    patches: PatchArray, shares: Array, largest: float, with_count: Callable[[int], float | None] | None
 ) -> Remedies:
     """The limit, layers, thickness or count that alone would suffice, by c ∝ N t_p (t_b + N t_p) of the worst patch."""
-    k = int(np.argmax(required / limit))
-    factor = required[k] / limit[k]
+    k = int(np.argmax(shares))
+    factor = shares[k]
     t_b, t_p, N = patches.effects.extent[k], patches.layout.thickness, patches.layout.layers
     layers, height = 0, np.inf
     if not patches.layout.structural:  # else they stiffen the link, too
@@ -291,13 +291,13 @@ def _remedies(
     if with_count is not None:
         missing, least = np.inf, np.abs(patches.amplifiers.range).min()
         for number in range(patches.served, 200):
-            if (largest := with_count(number)) is None:
+            if (voltage := with_count(number)) is None:
                 break
-            most, missing = number, largest / least
+            most, missing = number, voltage / least
             if missing <= 1.0:
                 count = number
                 break
-    return Remedies(required[k], layers, height / N, count, most, missing)
+    return Remedies(largest, layers, height / N, count, most, missing)
 
 
 @struct

@@ -92,6 +92,8 @@ def test_remedies_do(word):
     match word:
         case "limit":
             assert factor(limit=remedies.limit) == pytest.approx(1.0, rel=1e-9)
+            unequal = judged_of(arm(limit=[1e6] * 9 + [LIMIT])).patches["link"]  # the last is worst, and needs least
+            assert unequal.remedies.limit == pytest.approx(remedies.limit, rel=1e-9)
         case "layers":
             assert factor(layers=remedies.layers) <= 1.0 < factor(layers=remedies.layers - 1)
         case "thickness":
