@@ -1,7 +1,5 @@
 """Feasibility: requirements on patches and motors against their limits, and single changes that suffice. SI units."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -223,8 +221,8 @@ class Feasibility:
 
 
 def judge_patches(
-    patches: PatchArray,
-    voltages: Voltages,
+    patches: "PatchArray",
+    voltages: "Voltages",
     charge: Array,
     time: Array,
     p: Array,
@@ -277,7 +275,7 @@ def worst(values: Array, range: Array) -> tuple[Array, Array]:
 
 
 def _remedies(
-    patches: PatchArray, shares: Array, largest: float, with_count: Callable[[int], float | None] | None
+    patches: "PatchArray", shares: Array, largest: float, with_count: Callable[[int], float | None] | None
 ) -> Remedies:
     """The limit, layers, thickness or count that alone would suffice, by c ∝ N t_p (t_b + N t_p) of the worst patch."""
     k = int(np.argmax(shares))
@@ -323,8 +321,8 @@ def links_in_motion(run: Run, bodies: Mapping[str, tuple[ModalBody, Body]]) -> d
 def judge_actuators(
     run: Run,
     links: Mapping[str, LinkInMotion],
-    patches: Mapping[str, LinkPatches],
-    voltages: Mapping[str, Voltages],
+    patches: "Mapping[str, LinkPatches]",
+    voltages: "Mapping[str, Voltages]",
     others: Container[str],
 ) -> Feasibility:
     """Return the requirements on motors by joint ("JOINT 2" of a second coordinate) and on patches by layout.
@@ -344,7 +342,7 @@ def judge_actuators(
     return Feasibility(judge_motors(run), judged, find_unsupplied(run, links, patches, voltages, others))
 
 
-def _largest_voltage(run: Run, link: LinkInMotion, layout: PztLayout, count: int) -> float | None:
+def _largest_voltage(run: Run, link: LinkInMotion, layout: "PztLayout", count: int) -> float | None:
     """The voltage, V, that `count` such patches need alone, evenly spread; None if they have no room."""
     from .patches.link_patches import on_kept_modes, with_count
     from .patches.patches import voltage_gain
@@ -359,8 +357,8 @@ def _largest_voltage(run: Run, link: LinkInMotion, layout: PztLayout, count: int
 
 def find_unmet(
     links: Mapping[str, LinkInMotion],
-    patches: Mapping[str, LinkPatches],
-    voltages: Mapping[str, Voltages],
+    patches: "Mapping[str, LinkPatches]",
+    voltages: "Mapping[str, Voltages]",
     *,
     limited: bool,
 ) -> dict[str, Array]:
@@ -378,8 +376,8 @@ def find_unmet(
 def find_unsupplied(
     run: Run,
     links: Mapping[str, LinkInMotion],
-    patches: Mapping[str, LinkPatches],
-    voltages: Mapping[str, Voltages],
+    patches: "Mapping[str, LinkPatches]",
+    voltages: "Mapping[str, Voltages]",
     others: Container[str],
 ) -> Unsupplied | None:
     """Return the path error by modal forces that voltages cannot supply; None if these bend no link.

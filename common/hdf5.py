@@ -1,7 +1,5 @@
 """Reading HDF5 files that may be damaged, or made to lead elsewhere."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator, Mapping
@@ -92,7 +90,7 @@ def numbers(item: object, name: str) -> NDArray[np.float64]:
     return np.asarray(read(item), dtype=np.float64)
 
 
-def fields_in(values: Mapping[str, Any], record: type[DataclassInstance]) -> dict[str, Any]:
+def fields_in(values: Mapping[str, Any], record: "type[DataclassInstance]") -> dict[str, Any]:
     """Return the fields of `record`, by name, from a group or attributes. Raises `KeyError` for missing ones.
 
     Fields with a default may be missing, as in files of earlier versions; other `values` are left out.

@@ -3,8 +3,6 @@
 docs/key_tables.py makes tables of docs/reference/files.md of it; tests compare both with files as they are written.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, NamedTuple
@@ -366,7 +364,7 @@ def names_of(record: str) -> tuple[str, ...]:
     return tuple(pattern.rpartition("/")[2] for pattern, about in every if about.record == record)
 
 
-def write_record(group: h5py.Group, record: object) -> None:
+def write_record(group: "h5py.Group", record: object) -> None:
     """Write to `group` the fields of `record` that this module's tables list; None and () are skipped."""
     for name in names_of(type(record).__name__):
         value = getattr(record, field := name.removeprefix("@"))

@@ -1,7 +1,5 @@
 """Modal bodies in HDF5 files (docs/reference/files.md); needs h5py, no finite element library."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, fields
 from pathlib import Path
@@ -49,7 +47,7 @@ _DATASETS = {
     "surface_static": "stress/surface_static",
 }
 _NAMES = {"stress_loads": "stress/loads", "remarks": "remarks"}
-_PARTS: dict[str, tuple[str, type[DataclassInstance]]] = {
+_PARTS: "dict[str, tuple[str, type[DataclassInstance]]]" = {
     "stations": ("stations", Stations),
     "mesh": ("mesh", PictureMesh),
     "measured": ("modes/measured", MeasuredValues),
@@ -191,7 +189,7 @@ def _body(file: h5py.File) -> ModalBody:
     )
 
 
-def _arrays(group: h5py.Group, record: type[DataclassInstance]) -> dict[str, Any]:
+def _arrays(group: h5py.Group, record: "type[DataclassInstance]") -> dict[str, Any]:
     """The datasets of `group` that are fields of `record`; those without default must be there."""
     return {name: _numbers(item) for name, item in fields_in(group, record).items()}
 

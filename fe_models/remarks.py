@@ -1,7 +1,5 @@
 """What is allowed in a link file but looks like another unit or a slip; a remark each, for nothing here is certain."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, TypeGuard
 
@@ -17,7 +15,7 @@ SLOW, QUICK = 0.02, 1e5  # Hz: the first frequency of a link that is clamped at 
 OVERDAMPED = 1.0  # damping ratio: links have less
 
 
-def remarks_on_link(link: Link, label: str) -> Iterator[str]:
+def remarks_on_link(link: "Link", label: str) -> Iterator[str]:
     """Yield remarks on length, material, damping and mesh of a link, which `label` names."""
     yield from remarks_on_length(link.geometry.length, label)
     if (ratio := float(np.max(link.damping.ratio or 0.0))) >= OVERDAMPED:
@@ -37,12 +35,12 @@ def remarks_on_link(link: Link, label: str) -> Iterator[str]:
         yield from _beam(link, label)
 
 
-def is_beam(link: Link | None) -> TypeGuard[BeamLink]:
+def is_beam(link: "Link | None") -> "TypeGuard[BeamLink]":
     """Whether `link` is a beam, and not None."""
     return link is not None and link.geometry.kind == "beam"
 
 
-def _beam(link: BeamLink, label: str) -> Iterator[str]:
+def _beam(link: "BeamLink", label: str) -> Iterator[str]:
     """Of sections that are wider than the link is long, and of its lowest frequency as a cantilever."""
     section, length = link.sections[0], link.geometry.length
     if (widest := max(section.height, section.width)) > length:

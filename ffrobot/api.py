@@ -1,7 +1,5 @@
 """What the command line does, for use from Python; paths may be text."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -22,13 +20,13 @@ if TYPE_CHECKING:
 
 
 def solve(
-    scene: Scene | AnyPath,
+    scene: "Scene | AnyPath",
     output: AnyPath | None = None,
-    watcher: Watcher | None = None,
+    watcher: "Watcher | None" = None,
     *,
     resume: bool = False,
     allow_python: Sequence[AnyPath] = (),
-) -> Results:
+) -> "Results":
     """Solve the analyses of a scene or a scene file: `ffrobot solve`.
 
     Args:
@@ -81,7 +79,7 @@ def solve(
     return Results(path)
 
 
-def write_study(study: Finding, folder: AnyPath, *, figures: bool = True) -> list[Path]:
+def write_study(study: "Finding", folder: AnyPath, *, figures: bool = True) -> list[Path]:
     """Write the result of a design function as files for `write_report`, and as figures.
 
     Args:
@@ -101,7 +99,7 @@ def write_study(study: Finding, folder: AnyPath, *, figures: bool = True) -> lis
 
 
 def plot_results(
-    results: AnyPath | Results, folder: AnyPath, formats: Sequence[str] = ("png", "pdf"), *, only: Sequence[str] = ()
+    results: "AnyPath | Results", folder: AnyPath, formats: Sequence[str] = ("png", "pdf"), *, only: Sequence[str] = ()
 ) -> list[Path]:
     """Draw the figures of results: `ffrobot plot`.
 
@@ -130,7 +128,7 @@ def plot_results(
         return plot_file(path, Path(folder), formats, only)
 
 
-def write_report(results: AnyPath | Results | Sequence[AnyPath | Results], path: AnyPath) -> None:
+def write_report(results: "AnyPath | Results | Sequence[AnyPath | Results]", path: AnyPath) -> None:
     """Write one HTML page about results, or several side by side: `ffrobot report`.
 
     Args:
@@ -157,7 +155,7 @@ def write_report(results: AnyPath | Results | Sequence[AnyPath | Results], path:
 
 
 def view_file(
-    file: AnyPath | Results,
+    file: "AnyPath | Results",
     folder: AnyPath,
     *,
     analysis: str | None = None,
@@ -193,7 +191,7 @@ def view_file(
 
 
 def write_movie(
-    results: AnyPath | Results,
+    results: "AnyPath | Results",
     path: AnyPath,
     *,
     analysis: str | None = None,
@@ -228,7 +226,7 @@ def write_movie(
 
 
 @contextmanager
-def _files(*results: AnyPath | Results) -> Iterator[list[Path]]:
+def _files(*results: "AnyPath | Results") -> Iterator[list[Path]]:
     """The files of results, to be read; of those in memory, temporary ones."""
     from .common.hdf5 import reading
     from .results.file import Results

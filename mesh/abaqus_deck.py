@@ -1,7 +1,5 @@
 """Abaqus and CalculiX decks, keyword by keyword: text, sets, and what they say of parts, instances and the assembly."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Container, Iterable, Iterator, Mapping
@@ -114,9 +112,9 @@ class Sets:
     what: str
     members: dict[str, list[tuple[str, str | int, str]]] = field(default_factory=dict)
     spelled: dict[str, str] = field(default_factory=dict)
-    of_instances: Mapping[str, Sets] = field(default_factory=dict)
+    of_instances: "Mapping[str, Sets]" = field(default_factory=dict)
 
-    def copy(self) -> Sets:
+    def copy(self) -> "Sets":
         """Return a copy, to which members can be added."""
         return Sets(self.what, {name: list(of) for name, of in self.members.items()}, dict(self.spelled))
 
@@ -208,7 +206,7 @@ class Scope:
     elsets: Sets = field(default_factory=lambda: Sets("elements"))
     faces: dict[str, Keyword] = field(default_factory=dict)
 
-    def copy(self) -> Scope:
+    def copy(self) -> "Scope":
         """Return a copy, to which content can be added."""
         return replace(self, **{name: of.copy() for name, of in vars(self).items() if name not in ("frame", "place")})
 

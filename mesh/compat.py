@@ -4,8 +4,6 @@ Nothing outside this module asks for a dolfinx version. Importing it loads dolfi
 does: PyPI's wheel, PETSc's signal handlers and versions of UFL are dealt with before.
 """
 
-from __future__ import annotations
-
 import logging
 import sys
 import warnings
@@ -105,7 +103,7 @@ def coordinate_element(mesh: Mesh) -> basix.finite_element.FiniteElement:
     return basix.create_element(basix.ElementFamily.P, cell, mesh.geometry.cmap.degree, equispaced)
 
 
-def compiled_form(form: ufl.Form) -> fem.Form:
+def compiled_form(form: ufl.Form) -> "fem.Form":
     """Return `form` compiled, ready to be assembled."""
     with _compiling(form.ufl_domain().ufl_cargo().comm) as jit:
         return fem.form(form, **jit)

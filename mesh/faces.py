@@ -3,8 +3,6 @@
 All sources are treated alike: the facets that only one cell has, their normals, and the smooth faces that they form.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cached_property
 from typing import NoReturn
@@ -43,13 +41,13 @@ class PartBoundary:
     area: Array  # (b,) in m², of the straight facets
 
     @classmethod
-    def of(cls, part: PartMesh) -> PartBoundary:
+    def of(cls, part: PartMesh) -> "PartBoundary":
         """The boundary of `part`, whose cells are right-handed."""
         facets, _ = boundary_facets(part)
         return cls(part.points, facets, *facet_geometry(part.points, facets))
 
     @cached_property
-    def smooth_faces(self) -> list[SmoothFace]:
+    def smooth_faces(self) -> "list[SmoothFace]":
         """Facets joined across edges that are not sharp, largest face first."""
         count, sides = self.facets.shape
         pairs = np.stack([self.facets, np.roll(self.facets, -1, axis=1)], axis=2).reshape(-1, 2)
@@ -78,7 +76,7 @@ class SmoothFace:
     axis: Array | None
 
     @classmethod
-    def of(cls, boundary: PartBoundary, facets: Integers) -> SmoothFace:
+    def of(cls, boundary: PartBoundary, facets: Integers) -> "SmoothFace":
         """Make a face of the facets with the numbers `facets` (k,) on the `boundary`."""
         weights = boundary.area[facets] / boundary.area[facets].sum()
         normals = boundary.normal[facets]

@@ -6,8 +6,6 @@ ready one carries the checksum of its library. Entries depend on interpreter, ma
 Forms that came with the installation (`fe_models.forms`) are taken into the cache.
 """
 
-from __future__ import annotations
-
 import os
 import platform
 import shutil
@@ -37,7 +35,7 @@ _sound: set[str] = set()  # folder and name of the forms that this process has c
 
 
 @contextmanager
-def form_folder(comm: MPI.Comm, compiler: str) -> Iterator[Path]:
+def form_folder(comm: "MPI.Comm", compiler: str) -> Iterator[Path]:
     """Context of the folder in which FFCx finds and keeps compiled forms; collective on `comm`.
 
     `compiler`: its version. Where the cache cannot be written, forms are compiled for this process alone.

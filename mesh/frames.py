@@ -1,7 +1,5 @@
 """Local axes, lengths in the file's unit, in which files of meshes have nodes: rectangular, cylindrical, spherical."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np
@@ -25,7 +23,7 @@ class Frame:
     kind: Kind = "rectangular"
 
     @classmethod
-    def through(cls, points: Array, axes: str, kind: Kind = "rectangular") -> Frame:
+    def through(cls, points: Array, axes: str, kind: Kind = "rectangular") -> "Frame":
         """Make a frame from `points` (3, 3), file's unit: its origin, one on its axis `axes[0]`, one towards `axes[1]`.
 
         `axes` are in cyclic order: "xy", "yz" or "zx". Raises `ValueError` for three points on one line.

@@ -3,8 +3,6 @@
 An entry is named by the content of the keys that define the mesh, the part's file among them. NumPy only.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import zipfile
@@ -60,7 +58,7 @@ def kept_path(tables: PartTables) -> Path:
     return cache_folder("meshes") / f"{digest_of_content(content)}.npz"
 
 
-def kept_part(path: Path) -> PartMesh | None:
+def kept_part(path: Path) -> "PartMesh | None":
     """Read the mesh in the cache at `path`; None where there is none, or it is damaged, or of another user."""
     from .part_mesh import PartMesh
 
@@ -74,7 +72,7 @@ def kept_part(path: Path) -> PartMesh | None:
         return None
 
 
-def keep_part(path: Path, part: PartMesh) -> None:
+def keep_part(path: Path, part: "PartMesh") -> None:
     """Write a mesh to the cache at `path`; nothing happens where that cannot be written."""
     values = {field.name: getattr(part, field.name) for field in fields(part)}
     arrays = {name: value for name, value in values.items() if isinstance(value, np.ndarray)}

@@ -3,8 +3,6 @@
 meshio is loaded where it is used, in a process of its own.
 """
 
-from __future__ import annotations
-
 import io
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -96,7 +94,7 @@ def _in_words(error: BaseException) -> str:
     return str(error) or f"data that end or contradict ({type(error).__name__})"
 
 
-def _read(path: Path, said: io.StringIO) -> meshio.Mesh:
+def _read(path: Path, said: io.StringIO) -> "meshio.Mesh":
     """By meshio; what it cannot read of VTK's files VTK reads, where PyVista is installed (binary 5.1, LZ4, voxels)."""
     import meshio
 
@@ -139,7 +137,7 @@ def _check_ghosts(data: Mapping[str, Any]) -> None:
         raise ValueError(f"{hidden} cells that vtkGhostType hides or has as copies of others")
 
 
-def _raw_mesh(mesh: meshio.Mesh) -> RawMesh:
+def _raw_mesh(mesh: "meshio.Mesh") -> RawMesh:
     _check_ghosts(mesh.cell_data)
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points
@@ -160,7 +158,7 @@ def _raw_mesh(mesh: meshio.Mesh) -> RawMesh:
     return raw
 
 
-def _groups(mesh: meshio.Mesh) -> Iterator[Mapping[str, Integers]]:
+def _groups(mesh: "meshio.Mesh") -> Iterator[Mapping[str, Integers]]:
     """For each block, the cells of each group that has any in it."""
     values = _numbered(mesh)
     titles = {int(tag): name for name, (tag, *_) in mesh.field_data.items()}
@@ -177,7 +175,7 @@ def _groups(mesh: meshio.Mesh) -> Iterator[Mapping[str, Integers]]:
         yield {name: rows for name, rows in members.items() if rows.size}
 
 
-def _numbered(mesh: meshio.Mesh) -> list[NDArray[np.generic]] | None:
+def _numbered(mesh: "meshio.Mesh") -> list[NDArray[np.generic]] | None:
     """The first integer data of cells that number groups, by block."""
     for values in mesh.cell_data.values():
         arrays = [np.asarray(value) for value in values]

@@ -1,7 +1,5 @@
 """The mesh of a solid part as NumPy arrays, wherever it comes from: what the sources give and dolfinx is built from."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property
@@ -61,7 +59,7 @@ class PartMesh:
         """Return the tags in `cell_tag` of all cells of a volume group."""
         return self.regions[region], *self.overlaps.get(region, ())
 
-    def moved(self, points: Array) -> PartMesh:
+    def moved(self, points: Array) -> "PartMesh":
         """Return the mesh with other `points` (p, 3), m."""
         return replace(self, points=points)
 

@@ -1,7 +1,5 @@
 """Meshes that only say what a body looks like (STL, OBJ, DAE …), by trimesh (extra "urdf")."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +17,7 @@ READ = (".3mf", ".dae", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
 """Endings of files that are read: formats that trimesh reads itself, all of them without a program of others."""
 
 
-def loaded_skin(path: Path, scale: Sequence[float], d: Array, C: Array) -> trimesh.Trimesh:
+def loaded_skin(path: Path, scale: "Sequence[float]", d: Array, C: Array) -> "trimesh.Trimesh":
     """Read the mesh in `path`, turned by C (3, 3) and moved by d (3,), m.
 
     Coordinates times `scale` (3,) are in m, or in the file's unit. Raises `ModuleNotFoundError` without trimesh,
@@ -45,7 +43,7 @@ def loaded_skin(path: Path, scale: Sequence[float], d: Array, C: Array) -> trime
     return _moved(loaded, C @ np.diag(scale), d)
 
 
-def primitive_skin(shape: str, size: Sequence[float], d: Array, C: Array) -> trimesh.Trimesh:
+def primitive_skin(shape: str, size: "Sequence[float]", d: Array, C: Array) -> "trimesh.Trimesh":
     """Box (x, y, z), cylinder along z (radius, length) or sphere (radius,), m, turned by C (3, 3), moved by d (3,)."""
     from trimesh import creation
 
@@ -57,7 +55,7 @@ def primitive_skin(shape: str, size: Sequence[float], d: Array, C: Array) -> tri
     return _moved(made, C, d)
 
 
-def _moved(skin: trimesh.Trimesh, C: Array, d: Array) -> trimesh.Trimesh:
+def _moved(skin: "trimesh.Trimesh", C: Array, d: Array) -> "trimesh.Trimesh":
     transform = np.eye(4)
     transform[:3, :3], transform[:3, 3] = C, d
     skin.apply_transform(transform)

@@ -6,8 +6,6 @@ and M from weak forms ∫ weight u⁽ⁱ⁾ v⁽ʲ⁾ dx in UFL: a link needs th
 integrate products exactly, are the root of K: K = BᵀB but for round-off. Loads dolfinx.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -46,7 +44,7 @@ class FamilyModel:
         return np.array([values[place].toarray()[0] for place in places for values in self.fields.values()])
 
 
-def family_model(link: BeamLink, family: Family, forms: BeamForms, stations: Array) -> FamilyModel:
+def family_model(link: BeamLink, family: Family, forms: "BeamForms", stations: Array) -> FamilyModel:
     """Return the eigenproblem of `family` on the elements of `forms`, its fields at `stations` (k,), m."""
     if family in ("axial", "torsion"):
         V = lagrange(forms.nodes, 3)  # K = ∫EA u' v' dx, M = ∫ρA u v dx
@@ -64,7 +62,7 @@ def family_model(link: BeamLink, family: Family, forms: BeamForms, stations: Arr
     return FamilyModel(K, M, strain[:, free], {row: values[:, free] for row, values in fields.items()})
 
 
-def _euler_bernoulli(link: BeamLink, forms: BeamForms, stations: Array, second_moment: str) -> Bending:
+def _euler_bernoulli(link: BeamLink, forms: "BeamForms", stations: Array, second_moment: str) -> Bending:
     """K = ∫EI w'' v'' dx, M = ∫ρA w v dx on cubic Hermite elements; stations read w and w'."""
     V, E, rho = hermite(forms.nodes), link.material.youngs_modulus, link.material.density
     EI, rhoA = E * cellwise(link, forms.nodes, second_moment), rho * cellwise(link, forms.nodes, "area")
@@ -73,7 +71,7 @@ def _euler_bernoulli(link: BeamLink, forms: BeamForms, stations: Array, second_m
     return forms.matrix(EI, V, 2), forms.matrix(rhoA, V), V.root(EI, 2), *read, fixed
 
 
-def _timoshenko(link: BeamLink, forms: BeamForms, stations: Array, second_moment: str) -> Bending:
+def _timoshenko(link: BeamLink, forms: "BeamForms", stations: Array, second_moment: str) -> Bending:
     """K = ∫EI θ' η' + kGA (w' − θ)(v' − η) dx, M = ∫ρA w v + ρI θ η dx; w cubic, θ quadratic: no locking.
 
     Stations read w and the section's rotation θ.
@@ -133,7 +131,7 @@ class BeamForms:
         # Degrees of freedom of Lagrange functions are values at points.
         return (of.at(rows).T @ A @ by.at(columns)).tocsr()
 
-    def _form(self, *key: int) -> fem.Form:
+    def _form(self, *key: int) -> "fem.Form":
         """The form compiled, by degree and derivative of test and trial functions."""
         if key not in self._forms:
             v, u = ufl.TestFunction(self._space(key[0])), ufl.TrialFunction(self._space(key[2]))

@@ -4,8 +4,6 @@ The residual R = (I − X Xᵀ M) K⁻¹ B of unit loads B at interfaces beside 
 orthonormal in M and uncoupled in K, and serves as further modes (docs/theory.md, Attachment modes). NumPy only.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Container, Mapping, Sequence
 
 import numpy as np
@@ -65,7 +63,7 @@ class ModeSet:
     families: tuple[str, ...]
     X: Array
 
-    def followed_by(self, more: ModeSet) -> ModeSet:
+    def followed_by(self, more: "ModeSet") -> "ModeSet":
         """Return these modes and, after them, `more`."""
         omega2 = np.concatenate([self.omega2, more.omega2])
         return ModeSet(omega2, (*self.families, *more.families), np.concatenate([self.X, more.X], axis=1))

@@ -5,8 +5,6 @@ material points x_I + ξ move by Φ0 + φ × ξ, with translation Φ0 and rotati
 ∫ρ ξ dV = 0, ∫ρ ξ ξᵀ dV = E = ½ tr(J) I − J. The integrals are those of docs/theory.md, Inertia shape integrals.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -49,7 +47,7 @@ def lump_weights(mass: float, inertia: Iterable[float]) -> Array:
     return np.array([mass, mass, mass, *inertia])
 
 
-def lumps(records: Iterable[InterfaceRecord], interfaces: Mapping[str, Interface]) -> list[Lump]:
+def lumps(records: "Iterable[InterfaceRecord]", interfaces: Mapping[str, Interface]) -> list[Lump]:
     """Collect the lumps of a link: every record with mass or inertia, and the modes at its interface."""
     return [
         Lump(record.name, interfaces[record.name], record.mass, np.array(record.inertia))

@@ -5,8 +5,6 @@ the full one. The stiffness matrix is assembled straight into PETSc's symmetric 
 blocks), which takes half the memory and, measured, a third of the time of the general one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -5,8 +5,6 @@ Area-weighted averages about the centroid c of the face (the RBE3 convention): t
 need no more than ∫N_a ds and ∫x N_a ds of each shape function N_a. Work of patches on faces.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

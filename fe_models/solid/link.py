@@ -1,7 +1,5 @@
 """From a solid's link file to its modal body: mesh, supports, modes, integrals. Importing this loads dolfinx."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

@@ -8,8 +8,6 @@ translation (u, v, w) and rotation (φ_x, φ_y, φ_z) carry the shares
 The largest names the family; where together they carry less than half, the mode is `local`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 

@@ -8,8 +8,6 @@ at a time, with dense products in place of sparse matrices. Strain energies come
 assembled stiffness matrix, whose entries are up to (length / element size)⁴ as large as the lowest ω².
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property

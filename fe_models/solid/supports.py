@@ -9,8 +9,6 @@ definite matrices are factorized and B never fills one.
 Factors are MUMPS' Cholesky factors of an upper triangle, in memory or, of large ones, in files.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import tempfile

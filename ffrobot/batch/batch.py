@@ -4,8 +4,6 @@ All of them are executors of `concurrent.futures`. A job is a function of a modu
 result pickle. What it returns does not depend on who does it.
 """
 
-from __future__ import annotations
-
 import logging
 import os
 import signal
@@ -37,7 +35,7 @@ class Batch:
         self._executor: Executor | None = None
         self._futures: dict[Future[Any], int] = {}
 
-    def __enter__(self) -> Batch:
+    def __enter__(self) -> "Batch":
         return self
 
     def __exit__(self, *of_error: object) -> None:

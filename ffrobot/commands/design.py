@@ -3,8 +3,6 @@
 Options of the last three are parameters of the functions of `design.studies` that do the work.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,7 +31,13 @@ def study_options(folder: str, figures: str) -> Callable[[F], F]:
 
 
 def _study(
-    find: Callable[..., Finding], scene_file: Path, *args: object, folder: Path, figures: bool, batch: Batch, **how: Any
+    find: "Callable[..., Finding]",
+    scene_file: Path,
+    *args: object,
+    folder: Path,
+    figures: bool,
+    batch: "Batch",
+    **how: Any,
 ) -> None:
     """Find, print, and write tables, the file for reports, and figures. Raises `SolveError` for a shortfall."""
     from ..present.console import Display, summary_console
@@ -152,7 +156,7 @@ def uncertainty(
 @python_option
 @logging_options
 def sweep(
-    scene_file: Path, vary: tuple[str, ...], output: Path | None, batch: Batch, retry: bool, keep: bool, **which: Any
+    scene_file: Path, vary: tuple[str, ...], output: Path | None, batch: "Batch", retry: bool, keep: bool, **which: Any
 ) -> None:
     """Parameter sweep: solve a scene for many values of its keys; one table of all runs, failed ones included.
 

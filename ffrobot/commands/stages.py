@@ -1,7 +1,5 @@
 """The commands of both stages: `link`, `pose` and `solve`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,7 +29,7 @@ if TYPE_CHECKING:
 @click.option("--density", metavar="KG/M3", type=POSITIVE, help="Density for the mass of the part, with --inspect.")
 @logging_options
 def link(
-    link_file: Path, output: Path | None, unit: Unit | None, density: float | None, *, force: bool, inspect: bool
+    link_file: Path, output: Path | None, unit: "Unit | None", density: float | None, *, force: bool, inspect: bool
 ) -> None:
     """Compute the modal body file of one link (stage 1).
 
@@ -62,7 +60,7 @@ def link(
         click.echo(f"remark     {remark}")
 
 
-def _inspect(file: Path, output: Path | None, unit: Unit | None, density: float | None, *, force: bool) -> None:
+def _inspect(file: Path, output: Path | None, unit: "Unit | None", density: float | None, *, force: bool) -> None:
     """Print the contents of a part's file; write a draft of its link file, and a picture with numbers of faces."""
     from ..exchange.part_draft import draft_link
     from ..mesh.inspection import inspect_part
@@ -139,7 +137,7 @@ def solve(
             raise SolveError(f'{scene_file}: analysis "{name}": {text} (a warning, and --strict)')
 
 
-def _tell(solution: Solution, path: Path, remarked: int) -> None:
+def _tell(solution: "Solution", path: Path, remarked: int) -> None:
     """Print the summary, or the details; `remarked`: lines that stand above it."""
     from ..present.console import summary_console, summary_width
     from ..present.lines import error_budget, tables_of

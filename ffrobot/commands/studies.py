@@ -1,7 +1,5 @@
 """The commands that study one robot: `bench`, `fit`, `map` and `smooth`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -147,7 +145,7 @@ def map_(
     milling: Path | None,
     covariance: Path | None,
     figures: bool,
-    batch: Batch,
+    batch: "Batch",
     output: Path | None,
     **which: Any,
 ) -> None:
@@ -193,7 +191,7 @@ def map_(
     console.out(f"map        {path}")
 
 
-def _frequencies(text: str | None) -> Array:
+def _frequencies(text: str | None) -> "Array":
     """FIRST:LAST:COUNT in Hz, evenly spaced; none without a text."""
     import numpy as np
 

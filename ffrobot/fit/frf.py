@@ -9,8 +9,6 @@ With Z = K + iωD − ω²M and rows J of the points' displacements, the recepta
     dH = dJ_r X + Yᵀ dJ_fᵀ − Yᵀ dZ X,      X = Z⁻¹ J_fᵀ,  Y = Z⁻ᵀ J_rᵀ.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -51,7 +49,7 @@ def fit_responses(
     *,
     motors: Motors = "locked",
     force: bool = False,
-) -> ResponseFit:
+) -> "ResponseFit":
     """Fit keys of a scene to measured frequency response functions (FRFs): `ffrobot fit --frf`.
 
     Args:

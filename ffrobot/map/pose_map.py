@@ -1,7 +1,5 @@
 """A map from its plan to its file: postures, then quantities in parallel, part by part, resumable."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json
@@ -221,7 +219,7 @@ def check_point(solution: Solution, point: str, place: str = "--point") -> None:
 
 
 def _judged(
-    of: _PosesOf, postures: Postures, parts: Mapping[str, Indices], batch: Batch, watcher: Watcher
+    of: "_PosesOf", postures: Postures, parts: Mapping[str, Indices], batch: Batch, watcher: Watcher
 ) -> Mapping[str, Mapping[str, Array]]:
     """Findings by name of the part, from files or as jobs of `batch`."""
     files = {name: of.plan.folder / PARTS / f"{name}.npz" for name in parts}

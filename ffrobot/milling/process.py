@@ -6,8 +6,6 @@ at ω persists where 1 = a (1 − exp(−iωτ)) ν with an eigenvalue ν of C̄
 CIRP Annals 44, 1995).
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Sequence
 from pathlib import Path
@@ -133,7 +131,7 @@ def stable_depths(milling: Milling, free: FreeCoordinates, J: Array, axes: Array
     return {name: np.asarray(value, dtype=float) for name, value in found.items()}
 
 
-def _lobes(milling: Milling, limits: Sequence[StabilityLimits], worst: Tip, least: float) -> Array:
+def _lobes(milling: Milling, limits: "Sequence[StabilityLimits]", worst: "Tip", least: float) -> Array:
     """Stable depths (S,), m, at the speeds, by the `limits` of all feeds, or of the tip in the `worst` one."""
     speed = np.array(milling.speeds) * 2 * np.pi / 60
     if milling.method == "averaged" or not np.isfinite(least):

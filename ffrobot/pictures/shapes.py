@@ -1,7 +1,5 @@
 """Shapes of bodies in their frames: the surface, the line of stations, or lines between points."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -118,7 +116,7 @@ def _clustered(points: Array, triangles: Integers, size: Array) -> tuple[Indices
     return kept, mapped[apart][np.sort(first)]
 
 
-def _visual_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape | None:
+def _visual_shape(results: Results, body: MovingBody, notes: list[str]) -> "Shape | None":
     """None without visual shapes, and, with a line in `notes`, where one cannot be drawn."""
     keys = next(entry for entry in results.scene["body"] if entry["name"] == body.name)
     entries = keys.get("rigid", {}).get("visual", ())
@@ -139,7 +137,7 @@ def _visual_shape(results: Results, body: MovingBody, notes: list[str]) -> Shape
     return Shape(body, points, np.zeros((*points.shape, 0)), no_modes, np.array(skin.faces))
 
 
-def _skin(entry: Mapping[str, Any], folder: Path) -> trimesh.Trimesh:
+def _skin(entry: Mapping[str, Any], folder: Path) -> "trimesh.Trimesh":
     d, C = np.array(entry.get("at", (0.0, 0.0, 0.0))), of_rpy(*entry.get("rpy", (0.0, 0.0, 0.0)))
     if "mesh" in entry:
         return loaded_skin(folder / entry["mesh"], entry.get("scale", (1.0, 1.0, 1.0)), d, C)

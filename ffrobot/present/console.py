@@ -3,8 +3,6 @@
 Progress is a bar on a terminal, else a line now and then. Importing this loads nothing of an analysis.
 """
 
-from __future__ import annotations
-
 import logging
 import os
 import sys
@@ -32,14 +30,14 @@ def summary_width() -> int:
     return get_terminal_size().columns if sys.stdout.isatty() or "COLUMNS" in os.environ else PLAIN_WIDTH
 
 
-def plain_console(file: TextIO, width: int) -> Console:
+def plain_console(file: TextIO, width: int) -> "Console":
     """Return a console of `width` columns without markup: brackets in names are printed as they are."""
     from rich.console import Console
 
     return Console(file=file, width=width, markup=False, highlight=False, emoji=False)
 
 
-def summary_console() -> Console:
+def summary_console() -> "Console":
     """Return a console on the standard output."""
     return plain_console(sys.stdout, summary_width())
 
@@ -58,7 +56,7 @@ class Display(Watcher):
         self._title = ""
         self._began = self._last_shown = time.monotonic()
 
-    def __enter__(self) -> Display:
+    def __enter__(self) -> "Display":
         if sys.stderr.isatty() and is_first():
             from rich.console import Console
             from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn

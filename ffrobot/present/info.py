@@ -1,7 +1,5 @@
 """Contents of a modal body file, a results file or the file of a part, as text."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from io import StringIO
 from pathlib import Path
@@ -140,7 +138,7 @@ def _rendered(table: Table) -> str:
     return out.getvalue()
 
 
-def print_inspection(file: Path, part: Inspection, density: float | None, console: Console) -> None:
+def print_inspection(file: Path, part: "Inspection", density: float | None, console: Console) -> None:
     """Print unit, extent, volume, mass if `density` (kg/m³) is known, and a table of faces, largest first."""
     from .lines import plain_table  # loads the core
 

@@ -1,7 +1,5 @@
 """Lines of summaries, and tables of text on a terminal."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
@@ -39,7 +37,7 @@ def folded(lines: Iterable[str]) -> Iterator[str]:
     yield from (f"{before}{', '.join(of)}{after}" for (before, after), of in names.items())
 
 
-def plain_table(headers: Iterable[str], rows: Iterable[Iterable[str]], *, names: int = 2) -> Table:
+def plain_table(headers: Iterable[str], rows: Iterable[Iterable[str]], *, names: int = 2) -> "Table":
     """Return a table without rules: the first `names` columns are text and wrap, the others are numbers."""
     from rich.table import Table
 
@@ -54,19 +52,21 @@ def plain_table(headers: Iterable[str], rows: Iterable[Iterable[str]], *, names:
     return table
 
 
-def named_tables(first: str, rows: Iterable[tuple[str, Cells]]) -> Iterator[Table]:
+def named_tables(first: str, rows: "Iterable[tuple[str, Cells]]") -> "Iterator[Table]":
     """Yield a table of rows (name, cells), with the names below the heading `first`; none without rows."""
     named = list(rows)
     if named:
         yield plain_table((first, *named[0][1]), ((name, *cells.values()) for name, cells in named))
 
 
-def tables_of(results: Results, first: str, cells_of: Callable[[Results, str], Iterable[Cells]]) -> Iterator[Table]:
+def tables_of(
+    results: "Results", first: str, cells_of: "Callable[[Results, str], Iterable[Cells]]"
+) -> "Iterator[Table]":
     """Yield a table of the `cells_of` all analyses, with their names below the heading `first`; none without rows."""
     return named_tables(first, ((name, cells) for name in results.analyses for cells in cells_of(results, name)))
 
 
-def print_table(console: Console, headers: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
+def print_table(console: "Console", headers: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
     """Print `rows` below their headers, and an empty line."""
     console.print(plain_table(headers, rows))
     console.print()

@@ -1,7 +1,5 @@
 """Output of `ffrobot pose`: the posture at the start of a scene, and other possible ones."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,7 +22,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
-def print_start(path: Path, watcher: Watcher, console: Console) -> None:
+def print_start(path: Path, watcher: Watcher, console: "Console") -> None:
     """Print joint positions at the start of a scene, points of paths, and lines of [initial] for other postures."""
     model = prepare_scene(load_robot(path), watcher).model
     first, *others = start_postures(model)

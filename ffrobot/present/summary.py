@@ -1,7 +1,5 @@
 """Summary at the end of a solve: answers of all analyses, loads of motors, warnings, on one screen."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING
@@ -91,7 +89,7 @@ def _worst_motors(judged: Sequence[AnalysisVerdict]) -> Iterator[Row]:
         yield _motor(name, most.motors[name], most)
 
 
-def _motor(name: str, motor: MotorFeasibility, one: AnalysisVerdict) -> Row:
+def _motor(name: str, motor: "MotorFeasibility", one: AnalysisVerdict) -> Row:
     share = _percent(motor.factor) if motor.has_limits else "none"
     return name, *motor_texts(motor, one.units[name]), share, one.name
 

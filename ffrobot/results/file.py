@@ -1,7 +1,5 @@
 """Results of a scene: the file with its datasets, groups and attributes by name, by analysis and by link."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re
@@ -101,7 +99,7 @@ class Results:
             self.scene: dict[str, Any] = tomllib.loads(self.scene_text)
 
     @classmethod
-    def from_image(cls, image: bytes, path: Path) -> Results:
+    def from_image(cls, image: bytes, path: Path) -> "Results":
         """Results from the bytes of a file that exists only in memory; messages name it `path`."""
         return cls(path, image=image)
 
@@ -128,7 +126,7 @@ class Results:
         return str(self.attributes("/")["name"])
 
     @property
-    def space(self) -> Space:
+    def space(self) -> "Space":
         """The axes of the scene: x, y of planar ones, x, y, z of 3D ones."""
         from ..mbs.scene.space import SPACES
 
@@ -150,7 +148,7 @@ class Results:
         return [entry["name"] for entry in self.scene["analysis"] if entry["name"] in self._file]
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> "Verdict":
         """Answer of each analysis: feasibility, peaks and RMS of motors, deflection, stress, warnings and advice.
 
         `print(results.verdict)` prints the text of `ffrobot solve --verbose`; `results.verdict["inverse"]` is one
@@ -200,14 +198,14 @@ class Results:
             by_label.update(zip(labels, columns.T, strict=True))
         return by_label
 
-    def frame(self, analysis: str) -> DataFrame:
+    def frame(self, analysis: str) -> "DataFrame":
         """Histories of an analysis (see `columns`) as a pandas DataFrame, indexed by time (s)."""
         with extras():
             from pandas import DataFrame
 
         return DataFrame(self.columns(analysis)).set_index("time")
 
-    def to_xarray(self, analysis: str) -> Dataset:
+    def to_xarray(self, analysis: str) -> "Dataset":
         """All histories of an analysis as a Dataset of xarray, named as in the file: dimensions, units, coordinates.
 
         Dimension `time` (s), for `control/` of closed-loop runs `control/time`; further dimensions have the
@@ -219,7 +217,7 @@ class Results:
 
             return labelled(self, analysis, self.histories(analysis))
 
-    def linear(self, analysis: str) -> tuple[LinearModel, ...]:
+    def linear(self, analysis: str) -> "tuple[LinearModel, ...]":
         """Linear models of an analysis, one for each of its times. Raises `InputError` if there is none."""
         if not self.has(f"{analysis}/linear"):
             raise InputError(
@@ -229,14 +227,14 @@ class Results:
 
         return read_linear(self._file, analysis)
 
-    def controller(self, analysis: str) -> SampledController:
+    def controller(self, analysis: str) -> "SampledController":
         """Return controllers and observer of a closed-loop run at its start as one linear discrete-time system.
 
         Raises `InputError` where the analysis has none: no loop, or controllers that are not linear.
         """
         return self.controllers(analysis)[0]
 
-    def controllers(self, analysis: str) -> tuple[SampledController, ...]:
+    def controllers(self, analysis: str) -> "tuple[SampledController, ...]":
         """Return linear discrete-time controllers of a closed-loop run, one for each instant of a scheduled observer.
 
         All have the same states; interpolated matrices approximate those of the run. Raises `InputError` without any.
@@ -248,7 +246,7 @@ class Results:
 
         return read_controllers(self._file, analysis)
 
-    def state_spaces(self, analysis: str) -> tuple[StateSpace, ...]:
+    def state_spaces(self, analysis: str) -> "tuple[StateSpace, ...]":
         """Return linear models of an analysis, or the controller of a run. Raises `InputError` without either."""
         is_loop = self.has(f"{analysis}/control")
         return self.controllers(analysis) if is_loop else self.linear(analysis)
@@ -308,7 +306,7 @@ class Results:
         p, place = self[f"{analysis}/bodies/{body}/modal"], f"{analysis}/bodies/{body}/modal_transform"
         return p @ self[place].T if self.has(place) else p
 
-    def stress_recovery(self, analysis: str, body: str) -> Recovery:
+    def stress_recovery(self, analysis: str, body: str) -> "Recovery":
         """Modal coordinates and load sizes that determine the stresses of a flexible body; see `Recovery`."""
         from ..mbs.quantities.stress import Recovery, SectionLoads, mode_displacement  # loads the core
 
@@ -322,7 +320,7 @@ class Results:
             sections = SectionLoads(**{key: values[()] for key, values in layers.items()})
         return Recovery(str(entry.attrs["method"]), entry["modal"][()], names, entry["loads"][()], sections)
 
-    def __enter__(self) -> Results:
+    def __enter__(self) -> "Results":
         return self
 
     def __exit__(self, *error: object) -> None:

@@ -1,7 +1,5 @@
 """The verdict of a results file: what its analyses say, how far points are off their paths, and what to try next."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -145,7 +143,7 @@ def end_of(scene: Scene, name: str) -> float:
     return float(keys["end"]) if "end" in keys else end_of(scene, keys["actuation"]) if "actuation" in keys else 0.0
 
 
-def _motors(group: h5py.Group, coordinates: Coordinates) -> dict[str, MotorFeasibility]:
+def _motors(group: h5py.Group, coordinates: Coordinates) -> "dict[str, MotorFeasibility]":
     """As the analysis judged them; of kinds that do not, such as closed loops, from what their motors did."""
     if "feasibility" in group:
         return read_motors(group["feasibility"], list(coordinates))
@@ -179,7 +177,7 @@ def _patches(entry: h5py.Group) -> PatchNeed:
 
 
 def _answer(
-    group: h5py.Group, motors: Mapping[str, MotorFeasibility], patches: Mapping[str, PatchNeed]
+    group: h5py.Group, motors: "Mapping[str, MotorFeasibility]", patches: Mapping[str, PatchNeed]
 ) -> tuple[str, bool | None]:
     """Whether it can be done, in words and as such; of a run that ended early nothing is known of that."""
     own = own_results(group)
@@ -275,7 +273,7 @@ def _peak(dataset: h5py.Dataset, where: str, time: Array) -> Place:
 
 def _advice(
     group: h5py.Group,
-    motors: Mapping[str, MotorFeasibility],
+    motors: "Mapping[str, MotorFeasibility]",
     units: Mapping[str, str],
     patches: Mapping[str, PatchNeed],
 ) -> Iterator[str]:

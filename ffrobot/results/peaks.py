@@ -1,7 +1,5 @@
 """Peaks of histories in results files: of all times that were looked at, which are closer than the outputs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
@@ -24,7 +22,7 @@ MEAN_POWER, RMS_POWER = "mean_power", "rms_power"
 """Attributes of a joint: of the power of its motor, summed over its coordinates, W."""
 
 
-def peaking(result: AnalysisResult) -> Iterator[tuple[str, Array]]:
+def peaking(result: "AnalysisResult") -> Iterator[tuple[str, Array]]:
     """Name and values (T, …) of each history of an analysis that has peaks, at all times of `result.histories`.
 
     In SI units and along the axes of the scene. If `result.wants` only some: these, and others that cost nothing.
@@ -54,7 +52,7 @@ def peaking(result: AnalysisResult) -> Iterator[tuple[str, Array]]:
         yield f"pzt/{name}/required_voltage", voltages.required
 
 
-def _of_joint(result: AnalysisResult, joint: JointRecord, place: str) -> Iterator[tuple[str, Array]]:
+def _of_joint(result: "AnalysisResult", joint: "JointRecord", place: str) -> Iterator[tuple[str, Array]]:
     of, wants, is_single = result.histories, result.wants, len(joint.units) == 1
     run = of.run
     if wants(f"{place}/reaction"):

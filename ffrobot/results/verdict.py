@@ -1,7 +1,5 @@
 """The answer of a solve in one record, for terminal, report and Python: can it be done, and what to try next."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -109,7 +107,7 @@ class AnalysisVerdict:
     reached: tuple[float, float]
     answer: str
     feasible: bool | None
-    motors: Mapping[str, MotorFeasibility]
+    motors: "Mapping[str, MotorFeasibility]"
     units: Mapping[str, str]
     patches: Mapping[str, PatchNeed]
     tool_error: ToolError
@@ -194,7 +192,7 @@ class Verdict:
             yield from one.lines()
 
 
-def motor_texts(motor: MotorFeasibility, unit: str) -> tuple[str, str, str, str]:
+def motor_texts(motor: "MotorFeasibility", unit: str) -> tuple[str, str, str, str]:
     """Peak and RMS of force or torque in `unit`, speed and power as texts, with limits."""
     return (
         f"{_of_limit(motor.moment, motor.moment_limit)} {unit}",

@@ -1,7 +1,5 @@
 """Results files (HDF5): one group per analysis, written whole or not at all."""
 
-from __future__ import annotations
-
 import json
 import os
 import tomllib
@@ -179,7 +177,7 @@ def _write_voltages(group: h5py.Group, solution: Solution, actuation: Actuation)
             entry.attrs.update({"body": body, "bends": patches.layout.bends})
 
 
-def _write_feasibility(group: h5py.Group, solution: Solution, judged: Feasibility) -> None:
+def _write_feasibility(group: h5py.Group, solution: Solution, judged: "Feasibility") -> None:
     group = group.create_group("feasibility")
     group.attrs["feasible"] = judged.is_feasible
     if judged.unsupplied is not None:
@@ -199,7 +197,7 @@ def _write_feasibility(group: h5py.Group, solution: Solution, judged: Feasibilit
             group[f"joints/{label}"].attrs["unit"] = "N·m" if unit == "rad" else "N"
 
 
-def _write_point_forces(group: h5py.Group, points: PointSet, forces: PointForces, space: Space) -> None:
+def _write_point_forces(group: h5py.Group, points: "PointSet", forces: "PointForces", space: Space) -> None:
     group["residual"] = forces.residual
     group["residual_force"] = forces.unmet
     group["position"] = space.along(np.array([point.position for point in points.points]))

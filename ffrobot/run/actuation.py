@@ -1,7 +1,5 @@
 """From the modal forces of a motion to voltages of patches, and to whether motors and patches can do it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -38,18 +36,18 @@ JUMPS, BETWEEN = 100, 0.381966  # parts that may miss more; where in parts that 
 class Actuation:
     """Requirements of an analysis on motors and patches."""
 
-    voltages: Mapping[str, Voltages]  # of patches, by layout ([[pzt]])
+    voltages: "Mapping[str, Voltages]"  # of patches, by layout ([[pzt]])
     # (T, n) N/√kg, by body with patches: forces on modes of its file that no voltage within limits supplies
     unmet: Mapping[str, Array]
-    feasibility: Feasibility  # whether motors and patches keep their limits
+    feasibility: "Feasibility"  # whether motors and patches keep their limits
 
-    def at(self, rows: Indices) -> Actuation:
+    def at(self, rows: Indices) -> "Actuation":
         """Voltages and forces at the outputs with numbers `rows` alone; the feasibility stays that of all outputs."""
         voltages = {name: of_layout.at(rows) for name, of_layout in self.voltages.items()}
         return replace(self, voltages=voltages, unmet={name: values[rows] for name, values in self.unmet.items()})
 
 
-def make_patches(scene: Scene, bodies: Bodies) -> dict[str, LinkPatches]:
+def make_patches(scene: Scene, bodies: Bodies) -> "dict[str, LinkPatches]":
     """Patches by body. Raises `InputError` for layouts that do not fit link or analyses."""
     if not scene.pzt:
         return {}
@@ -77,7 +75,7 @@ def points_3d(scene: Scene, bodies: Bodies) -> dict[str, PointSet]:
     return points
 
 
-def given_voltages(scene: Scene, model: Model, patches: Mapping[str, LinkPatches]) -> Iterator[Drive]:
+def given_voltages(scene: Scene, model: Model, patches: "Mapping[str, LinkPatches]") -> Iterator[Drive]:
     """Yield modal forces by the voltages that the scene prescribes for patches, with their hysteresis."""
     bodies = {label: body for body, of_link in patches.items() for label in of_link.arrays}
     for number, load in enumerate(scene.load, 1):
@@ -117,7 +115,7 @@ def _straight(key: str, analyses: Sequence[Analysis], voltage: Sequence[TimeFunc
     return times, values
 
 
-def find_actuation(scene: Scene, run: Run, bodies: Bodies, patches: Mapping[str, LinkPatches]) -> Actuation:
+def find_actuation(scene: Scene, run: Run, bodies: Bodies, patches: "Mapping[str, LinkPatches]") -> Actuation:
     """Find voltages (V) of patches that come nearest to the modal forces of a motion, and judge all actuators.
 
     Links with actuation points need no patches. No link does where a later analysis applies forces on paths or points.

@@ -1,7 +1,5 @@
 """The bodies of a scene: from links, modal body files or numbers, with their payloads."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, replace
@@ -35,7 +33,7 @@ class LoadedBody:
     spatial: Body  # its equations in space, in which payloads with inertia on links are bodies of their own
     # the same with these payloads at small rotations: its modes are those of the loaded link
     carrying: Body
-    structure: StructureEffect | None = None  # change of mass and stiffness by patches; None without any
+    structure: "StructureEffect | None" = None  # change of mass and stiffness by patches; None without any
     # its modal body and the file of that, None where it is rigid
     modal: ModalBody | None = None
     path: Path | None = None
@@ -152,7 +150,7 @@ def _loaded(scene: Scene, body: BodyKeys, stage: Callable[[str], None]) -> Loade
     )
 
 
-def with_structure(body: LoadedBody, placed: Sequence[PlacedLayout]) -> LoadedBody:
+def with_structure(body: LoadedBody, placed: "Sequence[PlacedLayout]") -> LoadedBody:
     """Add mass and stiffness of patches to a link or a piece of it, according to its layouts."""
     if body.modal is None or not any(one.layout.adds_mass or one.layout.adds_stiffness for one in placed):
         return body

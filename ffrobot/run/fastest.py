@@ -5,8 +5,6 @@ motion is taken to be easier, which is so but for vibrations; the motion that is
 limits in any case.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf, sqrt
@@ -42,7 +40,7 @@ class Search:
 
     scene: Scene
     analysis: TimedAnalysis
-    judge: Judge
+    judge: "Judge"
     tried: dict[float, tuple[float, str]] = field(default_factory=dict)
     too_weak: tuple[str, ...] = ()  # motors whose torques at rest along the last motion exceed their limits
 
@@ -57,7 +55,7 @@ class Search:
         return self.tried[stretch][0] <= KEPT
 
 
-def fastest(scene: Scene, judge: Judge) -> tuple[Scene, str]:
+def fastest(scene: Scene, judge: "Judge") -> tuple[Scene, str]:
     """The scene with its paths stretched by the least factor (to 0.5 %) that keeps all limits, and a note on it.
 
     `judge` returns the feasibility of a scene. Raises `InputError` where nothing has a limit, no analysis can judge, or
@@ -152,7 +150,9 @@ def _names(scene: Scene) -> str:
     return quoted(one.name for one in scene.trajectory if one.fastest)
 
 
-def with_paths(scene: Scene, model: Model, judge: Judge, stage: Callable[[str], None]) -> tuple[Scene, tuple[str, ...]]:
+def with_paths(
+    scene: Scene, model: Model, judge: "Judge", stage: Callable[[str], None]
+) -> tuple[Scene, tuple[str, ...]]:
     """Return the scene with shapers for its frequencies and paths stretched to be `fastest`, and remarks.
 
     Shapers are for the frequencies of `model`. `judge` returns the feasibility of a scene. `stage` is called with the

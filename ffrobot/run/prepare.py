@@ -1,7 +1,5 @@
 """Everything of a scene but its analyses: equations of its bodies, of links in pieces too."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping
 from dataclasses import replace
@@ -123,7 +121,7 @@ def _all_stiffened(scene: Scene, is_needed: bool) -> bool:
 def _model(
     scene: Scene,
     bodies: Bodies,
-    patches: Mapping[str, LinkPatches],
+    patches: "Mapping[str, LinkPatches]",
     divided: Mapping[str, BodyInPieces],
     parts: Bodies,
     stiffened: bool,

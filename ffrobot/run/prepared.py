@@ -1,7 +1,5 @@
 """A scene ready for its analyses: its equations, bodies and patches, and what of it they leave out."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import field
@@ -32,8 +30,8 @@ class Prepared:
     scene: Scene
     model: Model
     bodies: Mapping[str, LoadedBody]  # by name
-    patches: Mapping[str, LinkPatches]  # by body
-    points: Mapping[str, PointSet] = field(default_factory=dict)  # actuation points, by body
+    patches: "Mapping[str, LinkPatches]"  # by body
+    points: "Mapping[str, PointSet]" = field(default_factory=dict)  # actuation points, by body
     # bodies in pieces by name; then `model` is that of the pieces, whose bodies are `parts`, and `whole` that of the
     # links
     divided: Mapping[str, BodyInPieces] = field(default_factory=dict)

@@ -1,7 +1,5 @@
 """What a solve computed: a scene and the results of its analyses, evaluated where studies ask for them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import field, replace
@@ -98,7 +96,7 @@ class Histories:
         return find_stresses(self.run, prepared.parts or prepared.bodies, prepared.patches, prepared.divided)
 
     @cached_property
-    def point_forces(self) -> Mapping[str, PointForces]:
+    def point_forces(self) -> "Mapping[str, PointForces]":
         """Forces (N) at actuation points, by body."""
         return _point_forces(self.prepared, self.run)
 
@@ -115,10 +113,10 @@ class AnalysisResult:
     # reactions that redundant constraints leave undetermined; None where there are none
     sharing: Sharing | None = None
     check: FinerCheck | None = None  # result of `check = "finer"`; None without this key
-    deviations: Deviations | None = None  # table of `robustness`; None without this key
+    deviations: "Deviations | None" = None  # table of `robustness`; None without this key
 
     @classmethod
-    def of(cls, prepared: Prepared, run: Run, earlier: Mapping[str, AnalysisResult]) -> Self:
+    def of(cls, prepared: Prepared, run: Run, earlier: "Mapping[str, AnalysisResult]") -> Self:
         """Make the result of a `run`, with peaks between outputs where known; `earlier`: results by analysis."""
         seen, sharing = shared_evenly(replace(run, links=links_in_pieces(prepared)))
         twists = {joint: gear.curve for joint, gear in gear_motions(seen).items()}  # splines through outputs
@@ -152,7 +150,7 @@ class AnalysisResult:
         return totals(self.run)
 
     @cached_property
-    def point_forces(self) -> Mapping[str, PointForces]:
+    def point_forces(self) -> "Mapping[str, PointForces]":
         """Forces (N) at actuation points at outputs, by body."""
         of = self.histories
         return of.point_forces if of.run is self.run else _point_forces(self.prepared, self.run)
@@ -270,7 +268,7 @@ class AnalysisResult:
         return max((link.stiffness_change for link in self.bending.values()), default=0.0)
 
 
-def _point_forces(prepared: Prepared, run: Run) -> dict[str, PointForces]:
+def _point_forces(prepared: Prepared, run: Run) -> "dict[str, PointForces]":
     if run.analysis.allocates_patches and any(row.is_trajectory for row in run.model.rows):
         return {name: solve_points(points, run) for name, points in prepared.points.items()}
     return {}

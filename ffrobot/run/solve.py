@@ -1,7 +1,5 @@
 """The analyses of a scene, run one after the other."""
 
-from __future__ import annotations
-
 import logging
 import time
 from collections.abc import Callable
@@ -130,7 +128,7 @@ def _with_enough_pieces(solution: Solution, interruption: Interruption) -> Solut
     return solution
 
 
-def _judged(solution: Solution, interruption: Interruption, trial: Scene) -> Feasibility | None:
+def _judged(solution: Solution, interruption: Interruption, trial: Scene) -> "Feasibility | None":
     """What the one analysis of a scene asks of motors and patches; None where it fails."""
     try:
         solved = _completed(unsolved(replace(solution, scene=trial)), interruption)

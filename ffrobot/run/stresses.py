@@ -1,7 +1,5 @@
 """Stresses of links over a motion, where their files hold those of modes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -31,7 +29,10 @@ if TYPE_CHECKING:
 
 
 def find_stresses(
-    run: Run, bodies: Mapping[str, LoadedBody], patches: Mapping[str, LinkPatches], divided: Mapping[str, BodyInPieces]
+    run: Run,
+    bodies: Mapping[str, LoadedBody],
+    patches: "Mapping[str, LinkPatches]",
+    divided: Mapping[str, BodyInPieces],
 ) -> dict[str, BodyStress]:
     """Compute stresses (Pa) of a run by body; those of links in pieces from their pieces, which are among `bodies`.
 
@@ -62,7 +63,7 @@ def find_stresses(
     return stresses
 
 
-def _in_plane(of_link: LinkPatches, spatial: Body) -> PatchArray | None:
+def _in_plane(of_link: "LinkPatches", spatial: Body) -> "PatchArray | None":
     """The patches of a link where all that they do to its sections is to bend them in the plane, and to stretch."""
     array, *others = of_link.arrays.values()
     layout, moves = array.layout, spatial.modal_transform.any(axis=1)
@@ -73,7 +74,9 @@ def _in_plane(of_link: LinkPatches, spatial: Body) -> PatchArray | None:
     return array if is_plain and not others else None
 
 
-def _sections(of_link: LinkPatches, link: ModalBody, spatial: Body, p: Array, loads: LinkLoads) -> SectionLoads | None:
+def _sections(
+    of_link: "LinkPatches", link: ModalBody, spatial: Body, p: Array, loads: LinkLoads
+) -> SectionLoads | None:
     """What the patches do to the sections of their link at file coordinates p (T, n); None of old files.
 
     Voltages are those whose modal forces the motion shows.

@@ -1,7 +1,5 @@
 """Who follows a solve and may stop it: a watcher, Ctrl-C, a cluster's end of time."""
 
-from __future__ import annotations
-
 import signal
 import threading
 from types import FrameType
@@ -43,7 +41,7 @@ class Interruption:
         self.watcher, self.requested = watcher, False
         self._is_main = threading.current_thread() is threading.main_thread()
 
-    def __enter__(self) -> Interruption:
+    def __enter__(self) -> "Interruption":
         if self._is_main:
             self._previous = {number: signal.signal(number, self._request) for number in SIGNALS}
             for handler in self._previous.values():  # asked before, where Python ignores exceptions

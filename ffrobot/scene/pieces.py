@@ -3,8 +3,6 @@
 Motions are computed in the scene of pieces; results are of the whole link (`ffrobot.run.pieces`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import pairwise
@@ -28,7 +26,7 @@ if TYPE_CHECKING:
 class BodyInPieces:
     """Division `cut` of a body's link into pieces, and their `names` as bodies, from root to tip."""
 
-    cut: CutLink
+    cut: "CutLink"
     names: tuple[str, ...]
 
     def point(self, label: str) -> str:

@@ -1,7 +1,5 @@
 """What is allowed in a scene but looks like another unit or a slip; a remark each, for nothing here is certain."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
@@ -32,7 +30,7 @@ SAMPLES = 201
 OUTPUT = 5e3  # bytes for each body and output, while results are evaluated: a link of four modes in space takes 5.5e3
 
 
-def remarks(scene: Scene) -> Iterator[str]:
+def remarks(scene: "Scene") -> Iterator[str]:
     """Yield remarks on a valid scene, one line each: on units, angles, times of paths."""
     links: dict[str, Link] = {}
     for body in scene.body:
@@ -77,7 +75,7 @@ def remarks(scene: Scene) -> Iterator[str]:
             yield from remarks_on_memory(outputs, len(scene.body), memory(), f'analysis "{analysis.name}"')
 
 
-def _masses(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
+def _masses(scene: "Scene", links: "Mapping[str, Link]") -> Iterator[str]:
     robot = 0.0
     for body in scene.body:
         if body.rigid is not None:
@@ -101,7 +99,7 @@ def _size(rigid: RigidBody) -> float:
     return max(float(np.linalg.norm(place)) for place in (rigid.center, *rigid.points.values()))
 
 
-def _inertias(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
+def _inertias(scene: "Scene", links: "Mapping[str, Link]") -> Iterator[str]:
     """Radii of gyration beyond the robot, and moments of inertia of an interface that no body has."""
     lengths = [links[body.name].geometry.length for body in scene.body if body.name in links]
     lengths += [_size(body.rigid) for body in scene.body if body.rigid is not None]
@@ -121,7 +119,7 @@ def _inertias(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
                 )
 
 
-def _joints(scene: Scene) -> Iterator[str]:
+def _joints(scene: "Scene") -> Iterator[str]:
     for joint in scene.joint:
         label = f'joint "{joint.name}"'
         if (away := float(np.linalg.norm(joint.at))) > LONGEST:
@@ -140,7 +138,7 @@ def _joints(scene: Scene) -> Iterator[str]:
         yield from remarks_on_length(float(np.linalg.norm(payload.center)), f'payload at "{payload.point}": center')
 
 
-def _patches(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
+def _patches(scene: "Scene", links: "Mapping[str, Link]") -> Iterator[str]:
     for layout in scene.pzt:
         label = f'pzt "{layout.label}"'
         if layout.modulus < SOFTEST_PATCH:
@@ -171,14 +169,14 @@ def _patches(scene: Scene, links: Mapping[str, Link]) -> Iterator[str]:
             )
 
 
-def _thickness_and_face(layout: PztLayout, link: BeamLink) -> tuple[float, float]:
+def _thickness_and_face(layout: "PztLayout", link: "BeamLink") -> tuple[float, float]:
     """Of a link across the patches, and the width of the face that they lie on, m."""
     extents = max(one.height for one in link.sections), max(one.width for one in link.sections)
     thick, wide = extents if layout.normal == "y" else extents[::-1]
     return thick, np.pi * wide if link.shapes[0].shape != "rectangle" else wide
 
 
-def _voltages(scene: Scene) -> Iterator[str]:
+def _voltages(scene: "Scene") -> Iterator[str]:
     layouts = {layout.label: layout for layout in scene.pzt}
     last = max((analysis.last_time for analysis in scene.analysis), default=0.0)
     for label, one in layouts.items() if last else ():
@@ -214,7 +212,7 @@ def memory() -> float:
         return np.inf
 
 
-def _angles(scene: Scene) -> Iterator[str]:
+def _angles(scene: "Scene") -> Iterator[str]:
     turning = {joint.name for joint in scene.joint if joint.type == "revolute"}
     sliding = {joint.name for joint in scene.joint if joint.type == "prismatic"}
     last = max((analysis.last_time for analysis in scene.analysis if analysis.follows_trajectories), default=0.0)
@@ -244,7 +242,7 @@ def _angles(scene: Scene) -> Iterator[str]:
                 )
 
 
-def remarks_on_times(scene: Scene) -> Iterator[str]:
+def remarks_on_times(scene: "Scene") -> Iterator[str]:
     """Yield remarks on trajectories that begin or end at other times than the runs."""
     for analysis in scene.analysis:
         if not analysis.follows_trajectories or not analysis.last_time:

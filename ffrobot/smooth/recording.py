@@ -1,7 +1,5 @@
 """Motions of all joints with motors of a robot, as a program streams or recorded them, and faults of such a stream."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -197,7 +195,7 @@ def evened(recording: Recording) -> Recording:
     return replace(recording, times=even) if by_even < EVEN**2 * by_stamps else recording
 
 
-def faults_of_motion(recording: Recording, limits: Limits, torque: Array) -> Iterator[Fault]:
+def faults_of_motion(recording: Recording, limits: "Limits", torque: Array) -> Iterator[Fault]:
     """Yield jumps, noise, and exceeded limits; of rows at even times where these are the smoother ones.
 
     `torque` (n,), N·m or N, is the largest of each motor in the motion.

@@ -1,7 +1,5 @@
 """The record of a run: motion, forces, how it went, and what only its kind of analysis finds. SI units."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, field, replace
 from functools import cache
@@ -61,7 +59,7 @@ class Statistics:
     step_ends: Array = field(default_factory=lambda: np.zeros(0))
     warnings: tuple[str, ...] = ()
 
-    def added_to(self, earlier: Statistics) -> Statistics:
+    def added_to(self, earlier: "Statistics") -> "Statistics":
         """Return statistics that include the earlier part of a resumed run."""
         counts = ("steps", "rejected", "evaluations", "wall_seconds")
         whole = replace(self, **{name: getattr(earlier, name) + getattr(self, name) for name in counts})
@@ -81,8 +79,8 @@ class Continuation:
 class GearCurve(NamedTuple):
     """The twist δ(t) of a compliant gear, rad, and where it is known the torque of the motor at its output, N·m."""
 
-    twist: BSpline | PPoly
-    torque: PPoly | None = None
+    twist: "BSpline | PPoly"
+    torque: "PPoly | None" = None
 
 
 @struct
@@ -119,7 +117,7 @@ class Prescription(NamedTuple):
     shape: Sequence[Sequence[TimeFunction]]  # p(t) of each body, m·√kg
     near: Array  # (n_q,) a posture near the first, rad and m
     # V(t) (k,) by body, V, where the analysis itself finds them
-    voltages: Mapping[str, PPoly] = MappingProxyType({})
+    voltages: "Mapping[str, PPoly]" = MappingProxyType({})
     breaks: Sequence[float] = ()  # s, between pieces of p(t), where p̈ jumps
 
 
@@ -147,13 +145,13 @@ class Run:
     # of compliant gears by joint, where they are known between outputs
     twists: Mapping[str, GearCurve] = field(default_factory=dict)
     # by name, links whose pieces are bodies of `model`
-    links: Mapping[str, LinkInPieces] = field(default_factory=dict)
+    links: "Mapping[str, LinkInPieces]" = field(default_factory=dict)
     statistics: Statistics = field(default=Statistics())
     details: Details = field(default=Details())  # findings of its kind of analysis
     continuation: Continuation | None = None
     prescribed: Prescription | None = None  # its motion as functions of time, where no steps integrate it
     # makes a run with outputs also between those of this one; None where nothing is between
-    look_closer: Callable[[], Run] | None = None
+    look_closer: "Callable[[], Run] | None" = None
 
     @property
     def space(self) -> Space:
@@ -171,15 +169,15 @@ class Run:
         return self.continuation.recording if self.continuation else None
 
     @property
-    def closer(self) -> Run:
+    def closer(self) -> "Run":
         """The run at its outputs and at times between, which show peaks; itself where nothing is between."""
         return self if self.look_closer is None else self.look_closer()
 
-    def with_look(self, at: Callable[[Array], Run]) -> Self:
+    def with_look(self, at: "Callable[[Array], Run]") -> Self:
         """Return the run with a `look_closer` by `at`, which makes a run at times (T,), s, that resolve its paths."""
 
         @cache
-        def look_closer() -> Run:
+        def look_closer() -> "Run":
             scene, shape = self.model.scene, (function for _, function, _ in self.analysis.prescribed())
             others = (*scene.load_functions, *shape)
             return at(path_times(self.time, scene.trajectory, self.analysis.last_time, others))
@@ -204,7 +202,7 @@ class Run:
         return self.status not in ("completed", *self.analysis.findings)
 
     @property
-    def arithmetic(self) -> np.errstate[Any]:
+    def arithmetic(self) -> "np.errstate[Any]":
         """Context that ignores overflow where a run ended early or diverges: its results may be infinite."""
         is_calm = self.status == "completed" and np.abs(self.v).max(initial=0.0) < HUGE
         return np.errstate() if is_calm else np.errstate(over="ignore", invalid="ignore")
@@ -222,15 +220,15 @@ class Run:
         """Return the run with the outputs of numbers `rows` alone."""
         return self._each(lambda x: x[rows])
 
-    def with_rows_of(self, other: Run, order: Indices) -> Self:
+    def with_rows_of(self, other: "Run", order: Indices) -> Self:
         """Return the run with outputs of `other`, at other times of the same motion, appended, then put in `order`."""
         return self._each(lambda x, y: np.concatenate([x, y])[order], other)
 
-    def after(self, earlier: Run) -> Self:
+    def after(self, earlier: "Run") -> Self:
         """Return the run with the earlier part of the same motion in front."""
         return self._each(lambda x, y: np.concatenate([y, x[len(y) :]]), earlier)
 
-    def _each(self, change: Callable[..., Array], *others: Run) -> Self:
+    def _each(self, change: Callable[..., Array], *others: "Run") -> Self:
         def changed(values: Sequence[Any]) -> Any:
             if isinstance(values[0], Mapping):
                 return {name: change(*(value[name] for value in values)) for name in values[0]}

@@ -7,8 +7,6 @@ codes, Mech. Struct. Mach. 22, 1994, 283–304), to first order in the modal coo
     G_r l = 2 ∫ρ[(x·Φ_l) E − Φ_l xᵀ] dV     G_e = 2 ∫ρ Φᵀ e~ Φ dV     O_e = ∫ρ Φᵀ ω~ω~ (x + Φ q) dV
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import replace
@@ -100,7 +98,7 @@ class ShapeIntegrals:
         """Return the inertia (3, 3) about the center of mass, kg·m², in axes of the body."""
         return self.inertia - point_inertia(self.mass, self.first_moment / self.mass)
 
-    def transformed(self, T: Array) -> ShapeIntegrals:
+    def transformed(self, T: Array) -> "ShapeIntegrals":
         """Return the integrals in modal coordinates p (m,) with q = T p, T (n, m) in units of q over those of p."""
         linear = {key: getattr(self, key) @ T for key in ("S_bar", "inertia_slope", "spin")}
         squares = ("spin_slope", "modal_mass", "centrifugal_slope", "stiffness", "damping")

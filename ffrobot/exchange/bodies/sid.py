@@ -4,8 +4,6 @@ Files are written as by PY_SID: J as six rows xx yy zz xy xz yz, M1 as (row, mod
 Other dialects are read, too: J as (3, 3), M1 as (row, column, mode).
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -87,12 +85,12 @@ def read_sid(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
     return body, (*remarks, *_turned_nodes(modal), *_checks(modal, integrals))
 
 
-def _interface(modal: Modal, node: SidObject) -> Interface:
+def _interface(modal: "Modal", node: "SidObject") -> Interface:
     phi, psi = (modal.taylor(node[key], (3, modal.modes)).m0 for key in ("phi", "psi"))
     return Interface(modal.taylor(node["origin"], (3, 1)).m0[:, 0], phi, psi)
 
 
-def _turned_nodes(modal: Modal) -> Iterator[str]:
+def _turned_nodes(modal: "Modal") -> Iterator[str]:
     """A line on nodes whose axes A_P are not those of the body, as interfaces need."""
     turned = [
         node.keys["number"]
@@ -104,7 +102,7 @@ def _turned_nodes(modal: Modal) -> Iterator[str]:
         yield f"AP: turned axes of nodes {', '.join(turned)} are omitted: joints there have the axes of the body"
 
 
-def _integrals(modal: Modal) -> ShapeIntegrals:
+def _integrals(modal: "Modal") -> ShapeIntegrals:
     n = modal.modes
     mdCM, J, Cr, Oe = modal["mdCM", (3, 1)], modal["J", (6, 1), (3, 3)], modal["Cr", (n, 3)], modal["Oe", (n, 6)]
     Me, Ke, De = (modal[key, (n, n)].m0 for key in ("Me", "Ke", "De"))
@@ -141,7 +139,7 @@ def _symmetric_part(slope: Array, Me: Array) -> Array | None:
     return symmetric if np.abs(symmetric).max(initial=0.0) > 0.5 * LARGEST_ASYMMETRY * scale else None
 
 
-def _is_in_both(modal: Modal, slope: Array) -> bool:
+def _is_in_both(modal: "Modal", slope: Array) -> bool:
     """Whether G_e has twice the symmetric part of C_r: geometric stiffness is in C_r alone."""
     n = modal.modes
     Ge = modal["Ge", (n, 3 * n)].m0
@@ -151,7 +149,7 @@ def _is_in_both(modal: Modal, slope: Array) -> bool:
     return any(np.abs(part - twice).max() < SAME * np.abs(twice).max() for part in parts)
 
 
-def _checks(modal: Modal, integrals: ShapeIntegrals) -> Iterator[str]:
+def _checks(modal: "Modal", integrals: ShapeIntegrals) -> Iterator[str]:
     """A line for each quantity that the file has twice, where the two differ."""
     n = modal.modes
     Gr = modal["Gr", (3, 3 * n)].m0
@@ -192,9 +190,9 @@ class SidObject:
 
     name: str
     keys: dict[str, str] = field(default_factory=dict)
-    inside: list[SidObject] = field(default_factory=list)
+    inside: "list[SidObject]" = field(default_factory=list)
 
-    def __getitem__(self, name: str) -> SidObject:
+    def __getitem__(self, name: str) -> "SidObject":
         for one in self.inside:
             if one.name.lower() == name.lower():
                 return one

@@ -1,7 +1,5 @@
 """URDF robot descriptions (wiki.ros.org/urdf/XML) as records, nothing merged or left out; SI units."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections import Counter
@@ -45,7 +43,7 @@ class Origin:
     rpy: Numbers3 = (0.0, 0.0, 0.0)
 
     @property
-    def place(self) -> Place:
+    def place(self) -> "Place":
         """Return the pose with its rotation matrix."""
         return Place(np.array(self.xyz), of_rpy(*self.rpy))
 
@@ -57,7 +55,7 @@ class Place:
     d: Array
     C: Array
 
-    def __matmul__(self, inner: Place) -> Place:
+    def __matmul__(self, inner: "Place") -> "Place":
         """Return the frame `inner`, which is in this one, in the other."""
         return Place(self.d + self.C @ inner.d, self.C @ inner.C)
 
@@ -73,11 +71,11 @@ class Inertial:
     center: Array
     inertia: Array
 
-    def seen_from(self, place: Place) -> Inertial:
+    def seen_from(self, place: Place) -> "Inertial":
         """Return mass properties in the frame in which the link's frame has the pose `place`."""
         return Inertial(self.mass, place.d + place.C @ self.center, place.C @ self.inertia @ place.C.T)
 
-    def __add__(self, other: Inertial) -> Inertial:
+    def __add__(self, other: "Inertial") -> "Inertial":
         """Both together (parallel axes)."""
         mass = self.mass + other.mass
         center = (self.mass * self.center + other.mass * other.center) / mass if mass else self.center

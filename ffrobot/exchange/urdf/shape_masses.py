@@ -1,7 +1,5 @@
 """Shapes and meshes of links: masses of links without <inertial> by a density, and comparison of others."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -83,14 +81,14 @@ def mesh_path(filename: str, urdf: Path) -> Path | None:
     return next((path for path in candidates if path.is_file()), None)
 
 
-def _loaded(mesh: MeshFile, urdf: Path) -> trimesh.Trimesh:
+def _loaded(mesh: MeshFile, urdf: Path) -> "trimesh.Trimesh":
     """The mesh in the axes of its link, m."""
     place, path = mesh.origin.place, mesh_path(mesh.filename, urdf)
     assert path is not None
     return loaded_skin(path, mesh.scale, place.d, place.C)
 
 
-def _is_closed(mesh: trimesh.Trimesh) -> bool:
+def _is_closed(mesh: "trimesh.Trimesh") -> bool:
     """Whether the facets enclose a volume, all with the same side out: else integrals are wrong."""
     return bool(mesh.is_watertight and mesh.is_winding_consistent)
 

@@ -1,7 +1,5 @@
 """Common parts of standard figures and charts of reports: curves, names, points that bend, limits of motors."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 from pathlib import Path
@@ -101,7 +99,7 @@ class FigureRecord(Record):
         return value
 
     @model_validator(mode="after")
-    def _consistent(self) -> FigureRecord:
+    def _consistent(self) -> "FigureRecord":
         if missing := [key for key in NEEDED[self.kind] if not getattr(self, key)]:
             raise ValueError(
                 f'expected {quoted(NEEDED[self.kind])} in kind = "{self.kind}", found no {quoted(missing)}'

@@ -1,7 +1,5 @@
 """The standard figures of any scene, as far as its results have the data."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain, islice
 from typing import Any
@@ -33,7 +31,7 @@ def standard_figures(results: Results, runs: int | None = None) -> tuple[FigureR
     return main + tuple(record for record in _drawn(results, OTHERS, runs) if record not in main)
 
 
-def _drawn(results: Results, of: Figures, runs: int | None = None) -> tuple[FigureRecord, ...]:
+def _drawn(results: Results, of: "Figures", runs: int | None = None) -> tuple[FigureRecord, ...]:
     """The figures of `of`, without histories of a single instant: static analyses have numbers, no curves."""
     drawn: list[FigureRecord] = []
     for record in chain.from_iterable(figures(results) for figures in of):

@@ -1,7 +1,5 @@
 """Studies of design commands: data of their diagrams, and the file."""
 
-from __future__ import annotations
-
 import json
 import re
 import textwrap
@@ -28,7 +26,7 @@ class Look(NamedTuple):
     marker: str
 
 
-LOOKS: dict[State, Look] = {
+LOOKS: "dict[State, Look]" = {
     "failed": Look("failed", "#8b95a3", 0.8, ":", "x"),
     "exceeded": Look("beyond a limit", COLORS[5], 0.8, "--", "^"),
     "kept": Look("within limits", COLORS[4], 0.8, "-", "o"),
