@@ -274,8 +274,8 @@ class _Integration:
         """Return what a replay applies (T, numbers) at the times of `motion`; `run` lacks the `known` first ones."""
         if self.drives.replayed is None:
             return np.zeros((len(motion.time), 0))
-        before = self.drives.replayed.source.sample(motion.time[:known].tolist())
-        return np.concatenate([before, run.replayed[known:]]) if known else run.replayed
+        before, after = self.drives.replayed.source.sample(motion.time[:known].tolist()), run.replayed[known:]
+        return np.concatenate([before, after] if len(after) else [before]) if known else run.replayed
 
     def under(self, motion: Run, replayed: Array) -> Run:
         """The motion with what a replay does (T, numbers) on joints and points."""
