@@ -1,11 +1,17 @@
 """Runs that were stopped go on from their results file as if they had never been."""
 
+import os
+import signal
+
 import h5py
 import pytest
+import tomli_w
+from small_robots import ARM
 from stopped_runs import SAME, Stops, check_attributes, differences, edit, go_on, stop
 
 import ffrobot
 from ffrobot.mbs import _core
+from ffrobot.run.watcher import Watcher
 
 END = 0.12
 SHORT = {"end = 1.0": f"end = {END}"}
@@ -113,3 +119,25 @@ def test_other_kinds_and_searches_for_modes_start_again(arm):
     assert 'resume=True) runs "inverse" again from its start' in stop(scene, "inverse", 0.0)
     results = go_on(scene)
     assert results.attributes("inverse")["status"] == "completed"
+
+
+class Told(Watcher):
+    """Gets Ctrl-C as the analysis begins."""
+
+    def stage(self, title):
+        if "again" in title:
+            os.kill(os.getpid(), signal.SIGINT)
+
+
+def test_a_stop_before_the_run_that_was_stopped_keeps_it(tmp_path):
+    """Analyses before it are complete, a replay among them."""
+    path, again = tmp_path / "scene.toml", {"name": "again", "kind": "forward", "actuation": "inverse"}
+    free = {"name": "free", "kind": "forward", "end": 200.0, "output_step": 0.5}
+    path.write_text(tomli_w.dumps(ARM | {"analysis": [*ARM["analysis"], again | {"apply": "joints"}, free]}))
+    stop(path, "free", 0.1)
+    kept = path.with_suffix(".h5").read_bytes()
+    with pytest.raises(ffrobot.SolveError, match="stopped"):
+        go_on(path, Told())
+    assert path.with_suffix(".h5").read_bytes() == kept
+    for name, difference in differences(go_on(path), ffrobot.solve(path)):
+        assert difference < SAME, name

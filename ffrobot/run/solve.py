@@ -54,7 +54,7 @@ def solve_scene(
 def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None) -> Solution:
     """Run the analyses of a prepared solution, from `solution.earlier` on where present.
 
-    `keep` is called with the new solution, also before an error is raised.
+    `keep` is called with the new solution, also before an error is raised, if it has all of `earlier`.
     """
     scene, model = solution.scene, solution.model
     check_turning(model)
@@ -78,7 +78,7 @@ def run_analyses(solution: Solution, watcher: Watcher, keep: Keep | None = None)
 
             solution = with_finer_check(solution, watcher)
         solution = _with_deviations(solution, interruption)
-        if keep is not None and solution.outcomes:
+        if keep is not None and solution.outcomes and solution.earlier.keys() <= solution.outcomes.keys():
             keep(solution)
     if solution.failure is not None:
         raise solution.failure
