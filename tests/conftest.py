@@ -18,7 +18,10 @@ from types import SimpleNamespace
 import h5py
 import numpy as np
 import pytest
+import tomli_w
+from beam_links import link_keys, rectangle
 from forked_commands import LIMIT, READING, Commands
+from tables_3d import pin, planar
 
 from ffrobot.batch import batch
 from ffrobot.common.cache import cache_folder
@@ -306,29 +309,16 @@ def _copy(name, folder):
 def solid_arm(ffrobot, tmp_path_factory):
     """A small soft solid link with stresses on its surface, swung by its tip; its folder, with `scene.results.h5`."""
     folder = tmp_path_factory.mktemp("solid_arm")
-    (folder / "arm.toml").write_text(
-        """
-name = "arm"
-material = { youngs_modulus = 0.7e9, poissons_ratio = 0.4, density = 1200.0 }
-geometry = { kind = "solid", length = 0.4, section = { shape = "rectangle", height = 0.02, width = 0.03 } }
-mesh = { cell = "hexahedron", order = 2, divisions = [8, 1, 1] }
-reference = { condition = "cantilever" }
-modes = { count = 4, family = "all" }
-stress = { surface = true }
-""",
-        encoding="utf-8",
-    )
-    (folder / "scene.toml").write_text(
-        """
-name = "solid_arm"
-gravity = [0.0, -9.81]
-body = [{ name = "arm", link = "arm.toml" }]
-joint = [{ name = "shoulder", type = "revolute", between = ["ground", "arm.root"], at = [0.1, 0.2] }]
-trajectory = [{ name = "tip", point = "arm.tip", y = "0.2 + 0.05*t" }]
-analysis = [{ name = "inverse", kind = "pcid", end = 0.02, output_step = 0.002 }]
-""",
-        encoding="utf-8",
-    )
+    mesh, modes = {"cell": "hexahedron", "order": 2, "divisions": [8, 1, 1]}, {"count": 4, "family": "all"}
+    keys = {"name": "arm", "modes": modes, "stress": {"surface": True}}
+    link = link_keys("solid", 0.4, rectangle(0.02, 0.03), mesh, E=0.7e9, nu=0.4, rho=1200.0, **keys)
+    scene = planar(
+        [{"name": "arm", "link": "arm.toml"}], [pin("shoulder", "ground", "arm.root", at=[0.1, 0.2])],
+        {"name": "inverse", "kind": "pcid", "end": 0.02, "output_step": 0.002}, name="solid_arm",
+        trajectory=[{"name": "tip", "point": "arm.tip", "y": "0.2 + 0.05*t"}],
+    )  # fmt: skip
+    for name, tables in (("arm", link), ("scene", scene)):
+        (folder / f"{name}.toml").write_text(tomli_w.dumps(tables), encoding="utf-8")
     ffrobot.ok("solve", "scene.toml", cwd=folder)
     return folder
 

@@ -17,9 +17,8 @@ import tempfile
 import tomllib
 from collections import Counter
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import tomli_w
 from forked_command import BAD, GOOD, Outcomes, outcome, run
@@ -33,11 +32,9 @@ IN_SPACE = ("arm3_line_static", "stanford", "slider_crank_3d")
 OUTPUTS = 10  # of each analysis
 
 
-@dataclass
-class Case:
+class Case(NamedTuple):
     """A case cut short: its `folder`, and the TOML files that can be changed."""
 
-    name: str
     folder: Path
     files: list[Path]
 
@@ -92,15 +89,15 @@ class Campaign:
         files = [scene, *sorted(path.resolve() for path in links), *folder.glob("figures.toml")]
         code, told = run(["solve", "scene.toml", "-o", "scene.results.h5"], folder)
         print(f"{folder.name}: exit code {code} {told.strip()[:200]}", flush=True)
-        return Case(folder.name, folder, files)
+        return Case(folder, files)
 
     def one(self, number: int) -> None:
         case, file, place = self.turns[number % len(self.turns)]
-        root = self.folder / "try"
+        ready, root = case.folder.parent, self.folder / "try"
         shutil.rmtree(root, ignore_errors=True)
-        shutil.copytree(case.folder.parent, root, ignore=lambda at, names: [] if Path(at) != case.folder.parent else [
-            name for name in names if name not in {case.name, *(f.parent.name for f in case.files)}])  # fmt: skip
-        folder, changed = root / case.name, root / file.relative_to(case.folder.parent)
+        for name in {one.relative_to(ready).parts[0] for one in case.files}:
+            shutil.copytree(ready / name, root / name)
+        folder, changed = root / case.folder.name, root / file.relative_to(ready)
         os.symlink("loop", folder / "loop")
         text = changed.read_text(encoding="utf-8")
         if self.chance.random() < 0.04:
@@ -113,7 +110,7 @@ class Campaign:
             except (TypeError, ValueError, RecursionError) as error:
                 content, how = b"x = [" + b"[" * 500, f"{how}: {error}"
         changed.write_bytes(content)
-        label = f"{number}: {case.name}/{file.name}: {how}"
+        label = f"{number}: {folder.name}/{file.name}: {how}"
         names = ["scene.toml", *(f.name for f in case.files), "loop", "output"]
         if changed.name == "figures.toml":
             named = [path.name for path in folder.iterdir()]
