@@ -15,6 +15,11 @@ Booleans = NDArray[np.bool_]
 PPoly = Any  # scipy.interpolate.PPoly, of which type checkers know nothing, and which a start does not load
 
 
+def in_parts(count: int, size: int) -> list[slice]:
+    """Slices of `size` numbers each, the last of what is left, of `count` in all."""
+    return [slice(k, k + size) for k in range(0, count, size)]
+
+
 def null_space(J: Array, tolerance: float) -> Array:
     """Orthonormal basis (k, m) of the null space of J (r, k): singular values below `tolerance` times the largest."""
     _, sizes, V = np.linalg.svd(J)

@@ -13,7 +13,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from ...common.arrays import Array, Indices
+from ...common.arrays import Array, Indices, in_parts
 from ...common.errors import InputError, quoted
 from ...common.libraries import scipy
 from ...common.structs import struct
@@ -183,8 +183,8 @@ def _measured(measure: str, reach: Array) -> Array:
 def _voltages(shape: Array, Phi_V: Array, F_p: Array) -> Array:
     """Largest voltage (sets,) that the modes' forces take over a path; voltages of least size where many would do."""
     forces, largest = shape @ F_p.T, []
-    for start in range(0, Phi_V.shape[1], CHUNK):
-        chunk = np.einsum("mn,nsk->smk", shape, Phi_V[:, start : start + CHUNK])
+    for some in in_parts(Phi_V.shape[1], CHUNK):
+        chunk = np.einsum("mn,nsk->smk", shape, Phi_V[:, some])
         sizes = np.linalg.svd(chunk, compute_uv=False)
         reachable = sizes[:, -1] > sizes[:, 0] / SINGULAR
         worst = np.full(len(chunk), np.inf)

@@ -22,7 +22,7 @@ from dolfinx.mesh import Mesh
 from mpi4py import MPI
 from scipy.spatial import cKDTree
 
-from ...common.arrays import Array, Integers
+from ...common.arrays import Array, Integers, in_parts
 from ...common.errors import InputError
 from ...common.structs import struct
 from ...mesh.compat import coordinate_element, geometry_nodes, lagrange_element, node_map
@@ -43,7 +43,7 @@ def modal_strains(space: FunctionSpace, cells: Integers, X: Array, modes: Array)
     n = modes.shape[1]
     values = modes.reshape(-1, 3 * n)
     strains = np.empty((len(cells), 6, n))
-    for part in (slice(start, start + CHUNK) for start in range(0, len(cells), CHUNK)):
+    for part in in_parts(len(cells), CHUNK):
         # ∂φ/∂x = J⁻ᵀ ∂φ/∂X; displacement gradient [j, (i, n)] = ∂u_i/∂x_j.
         J = jacobians(space.mesh, cells[part], X[part])
         basis = element.tabulate(1, X[part])[1:, :, :, 0].transpose(1, 0, 2)
@@ -254,9 +254,7 @@ def gradients(model: SolidModel, fields: Array) -> Iterator[Gradients]:
     # The Jacobian of a straight tetrahedron is the same everywhere.
     straight = cell == basix.CellType.tetrahedron and mesh.geometry.cmap.degree == 1
     maps = coordinate_element(mesh).tabulate(1, X[:1] if straight else X)[1:, :, :, 0]
-    step = max(1, NUMBERS // (9 * len(rule) * k))
-    for start in range(0, len(points), step):
-        part = slice(start, min(start + step, len(points)))
+    for part in in_parts(len(points), max(1, NUMBERS // (9 * len(rule) * k))):
         J = np.einsum("jqv,cvi->cqij", maps, mesh.geometry.x[points[part]])
         weights = np.abs(np.linalg.det(J)) * rule
         inverse = np.linalg.inv(J).transpose(0, 1, 3, 2)  # ∂X_a/∂x_j at [j, a]

@@ -21,7 +21,7 @@ import numpy as np
 from dolfinx import fem
 from petsc4py import PETSc
 
-from ...common.arrays import Array, Integers
+from ...common.arrays import Array, Integers, in_parts
 from ...common.cache import cache_folder
 from ...common.errors import SolveError
 from ...common.locks import is_running, this_process
@@ -77,8 +77,7 @@ class Factors:
     def solve(self, loads: Array) -> Array:
         """Return K⁻¹ f (own, k), m, for `loads` f (own, k), N; collective."""
         result = np.empty_like(loads)
-        for start in range(0, loads.shape[1], COLUMNS):
-            part = slice(start, start + COLUMNS)
+        for part in in_parts(loads.shape[1], COLUMNS):
             f = np.asfortranarray(loads[:, part])
             u = np.empty_like(f)
             size = self._sizes, (None, f.shape[1])

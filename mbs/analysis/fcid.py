@@ -88,9 +88,6 @@ class Fcid(TimedAnalysis):
                 rows,
             )
 
-        def equations() -> _core.SpatialPrescribedMotion:
-            return _core.SpatialPrescribedMotion(driven_mechanism(model), q)
-
         began = time.perf_counter()
         has_motors = len(model.motor_columns) == freedom
         mechanism = fastest_mechanism(model, has_motors=has_motors)
@@ -101,7 +98,8 @@ class Fcid(TimedAnalysis):
 
         def at(times: Array) -> Run:
             states = prescribed_motion(model, motion, sampled(shape, times), times, q[None])._asdict()
-            how, prescribed = Statistics(warnings=path.warnings), Prescription(equations, shape, q)
+            prescribed = Prescription(lambda: _core.SpatialPrescribedMotion(driven_mechanism(model), q), shape, q)
+            how = Statistics(warnings=path.warnings)
             return Run(analysis=self, model=model, time=times, **states, statistics=how, prescribed=prescribed)
 
         try:

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...common.arrays import Array, Indices
+from ...common.arrays import Array, Indices, in_parts
 from ...common.errors import InputError
 from ...common.libraries import scipy
 from ...common.structs import struct
@@ -116,10 +116,9 @@ class Servo:
         p, ṗ = v and p̈ = a are (N, n), m·√kg and s. Raises `Stopped`.
         """
         r, near = np.zeros_like(p), self.postures(times)
-        for k in range(0, len(times), MOST_STATES):
+        for part in in_parts(len(times), MOST_STATES):
             if not self.goes_on():
                 raise Stopped
-            part = slice(k, k + MOST_STATES)
             r[part] = self.motion.left_on_modes(times[part].tolist(), p[part], v[part], a[part], near[part])[1]
         return r
 

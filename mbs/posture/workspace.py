@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, Booleans, Indices
+from ...common.arrays import Array, Booleans, Indices, in_parts
 from ...common.errors import InputError
 from ...common.rotations import logarithm
 from ...common.structs import struct
@@ -152,7 +152,7 @@ def _elsewhere(
 
 
 def _solved(model: Model, numbers: Indices, guess: Array) -> tuple[Array, Booleans]:
-    parts = [slice(k, k + TOGETHER) for k in range(0, len(numbers), TOGETHER)]
+    parts = in_parts(len(numbers), TOGETHER)
     solved = [model.constraints.postures(guess[part], numbers[part].astype(float)) for part in parts]
     return np.concatenate([q for q, _ in solved]), np.concatenate([met for _, met in solved])
 

@@ -19,7 +19,7 @@ from ..model.known_motion import mass_matrices
 from ..model.nodes import Node
 from ..model.system import MultibodySystem
 from ..run.record import Run
-from .motion import constraint_rows, node_of, section_motion
+from .motion import X, constraint_rows, node_of, section_motion
 
 ROUND_OFF = 1e-12  # of a link's size
 JOLT = 0.01  # of the largest deformation: where more begins to ring at once, modes that are not there would ring, too
@@ -127,7 +127,6 @@ def start_of_motion(run: Run) -> Start:
 
 
 INTERVALS = 16  # of a piece, over each of which curvature is constant but for its share in the direction
-X = np.array([1.0, 0.0, 0.0])
 
 
 def missed_by_pieces(run: Run, pieces: Mapping[str, ModalBody]) -> Array:
@@ -163,10 +162,7 @@ def rod_ends(modal: ModalBody, p: Array) -> tuple[Array, Array]:
     """
     x = np.linspace(0.0, modal.length, 2 * INTERVALS + 1)  # with the middles of intervals
     places, h = [modal.interpolate(at) for at in x], x[2]
-    phi, u = (
-        np.array([p @ of.T for of in kind])
-        for kind in zip(*((at.rotation, at.translation) for at in places), strict=True)
-    )
+    phi, u = (np.array([p @ getattr(at, kind).T for at in places]) for kind in ("rotation", "translation"))
     A, r = np.tile(np.eye(3), (len(p), 1, 1)), np.zeros((len(p), 3))
     for k in range(0, 2 * INTERVALS, 2):
         turn, mean = phi[k + 2] - phi[k], (phi[k] + 4 * phi[k + 1] + phi[k + 2]) / 6

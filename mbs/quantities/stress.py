@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, Indices, Integers
+from ...common.arrays import Array, Indices, Integers, in_parts
 from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
 from ...fe_models.modal_body.unit_loads import work_on_modes
@@ -191,11 +191,10 @@ def _surface(modal: Array, positions: Array, p: Array) -> SurfaceStress:
     count, _, n = modal.shape
     rows = np.einsum("ab,pbn->apn", _distortion(), modal).reshape(-1, n)
     largest, place = np.zeros(len(p)), np.zeros(len(p), dtype=np.int64)
-    step = max(1, int(CHUNK_BYTES / (rows.shape[0] * 8)))
-    for start in range(0, len(p), step):
-        parts = (rows @ p[start : start + step].T).reshape(5, count, -1)
+    for some in in_parts(len(p), max(1, int(CHUNK_BYTES / (rows.shape[0] * 8)))):
+        parts = (rows @ p[some].T).reshape(5, count, -1)
         squares = np.einsum("apt,apt->pt", parts, parts)
         worst = squares.argmax(axis=0)
-        place[start : start + step] = worst
-        largest[start : start + step] = np.sqrt(np.take_along_axis(squares, worst[None], axis=0)[0])
+        place[some] = worst
+        largest[some] = np.sqrt(np.take_along_axis(squares, worst[None], axis=0)[0])
     return SurfaceStress(largest, positions[place])

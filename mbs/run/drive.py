@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...common.arrays import Array, Indices
+from ...common.arrays import Array, Indices, in_parts
 from ...common.errors import InputError
 from ...common.structs import struct
 from .. import _core
@@ -341,9 +341,9 @@ class _Integration:
             sizes = np.maximum(sizes, np.abs(values).max(axis=0))
             return motion.at(telling(motion.time, values, sizes))
 
-        size, parts = LOOKS.all_up_to, []
-        for first in range(0, len(times), size):
-            rows = np.arange(first, min(first + size, len(times)))
+        parts = []
+        for part in in_parts(len(times), LOOKS.all_up_to):
+            rows = np.arange(len(times))[part]
             parts.append(thinned(self.motion(at(rows), times[rows])))
             if not progress(float(times[-1])):
                 break
