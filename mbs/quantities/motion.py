@@ -7,12 +7,13 @@ Links in pieces move as the whole link: docs/theory.md, Subdivided links.
 
 from dataclasses import replace
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, in_parts
 from ...common.rotations import exponential, left_jacobian, logarithm, of_quaternion, quaternions
-from ...common.structs import kept, struct
+from ...common.structs import kept
 from ...fe_models.link_records.families import HOLDING_ROOT
 from ...fe_models.modal_body import ModalBody
 from ..model.body import BodyPoint, bent_section
@@ -27,11 +28,11 @@ from ..model.tree import CutCoordinate, CutMotion
 from ..run.record import Run
 
 AT_END = 1e-9  # of the length
+AT_ONCE = 1024  # instants whose sections are in memory together
 X = np.array([1.0, 0.0, 0.0])
 
 
-@struct
-class BodyMotion:
+class BodyMotion(NamedTuple):
     """Motion of a body's frame and modes, one row per output, in global axes."""
 
     position: Array  # (T, 3) R of the frame's origin, m
@@ -55,28 +56,27 @@ def _motion_of_link(run: Run, link: LinkInPieces) -> BodyMotion:
     root, tip = sections[int(np.argmin(x))], sections[int(np.argmax(x))]
     holds_root = link.modal.reference_condition in HOLDING_ROOT
     A, omega = (root.F, root.omega) if holds_root else _along_chord(root, tip)
-    u, u_dot = (np.zeros((len(x), 4, len(root.r))) for _ in range(2))
+    u, u_dot = list[Array](), list[Array]()
     for k, at in enumerate(sections):
         arm, rate = at.r - root.r, at.velocity - root.velocity
         phi = logarithm(np.swapaxes(A, -1, -2) @ at.F)
         spin = _seen_from(A, at.omega - omega)
-        u[k, :3] = (_seen_from(A, arm) - x[k] * X).T
-        u_dot[k, :3] = _seen_from(A, rate - np.cross(omega, arm)).T
-        u[k, 3] = link.modal.length * phi[:, 0]
-        u_dot[k, 3] = link.modal.length * np.linalg.solve(left_jacobian(phi), spin[:, :, None])[:, 0, 0]
-    p, p_dot = (_nearest_shape(link.modal, each) for each in (u, u_dot))
-    return BodyMotion(root.r, continuous(quaternions(A)), root.velocity, omega, p, p_dot)
+        phi_dot = np.linalg.solve(left_jacobian(phi), spin[:, :, None])
+        u += [*(_seen_from(A, arm) - x[k] * X).T, link.modal.length * phi[:, 0]]
+        u_dot += [*_seen_from(A, rate - np.cross(omega, arm)).T, link.modal.length * phi_dot[:, 0, 0]]
+    p, p_dot = (_nearest_shape(link.modal, np.array(each)) for each in (u, u_dot))
+    return BodyMotion(root.r, quaternions(A), root.velocity, omega, p, p_dot)
 
 
 def _sections(run: Run, link: LinkInPieces, stations: Array) -> list[Motion]:
     """Of the sections at `stations` (m from the root); to second order at the ends of pieces, where K is."""
-    starts, names, tree = link.starts, link.names, run.model.tree
+    starts, names, tree, slack = link.starts, link.names, run.model.tree, AT_END * link.modal.length
     bodies, points = {node.body.name: node.body for node in tree.nodes}, list[str]()
     for x in stations.tolist():
         k = int(np.clip(np.searchsorted(starts, x, side="right") - 1, 0, len(names) - 1))
-        at, body = link.pieces[k].interpolate(min(x - starts[k], link.pieces[k].length)), bodies[names[k]]
-        ends = link.pieces[k].interfaces.items()
-        near = (end for end, of in ends if abs(of.position[0] - at.position[0]) < AT_END * link.modal.length)
+        piece, body = link.pieces[k], bodies[names[k]]
+        at = piece.interpolate(min(x - starts[k], piece.length))
+        near = (end for end, of in piece.interfaces.items() if abs(of.position[0] - at.position[0]) < slack)
         point, T = next(near, f"station {x}"), body.modal_transform
         if point not in body.points:
             place = BodyPoint(at.position, at.translation @ T, at.rotation @ T)
@@ -111,10 +111,10 @@ def _seen_from(A: Array, vectors: Array) -> Array:
 
 
 def _nearest_shape(modal: ModalBody, u: Array) -> Array:
-    """P (T, n) for which Φp comes nearest to displacements and twists at the length u (stations, 4, T), m."""
+    """P (T, n) for which Φp comes nearest to displacements and twists at the length u (4 stations, T), m."""
     stations = modal.stations
     rows = np.concatenate([stations.translation, modal.length * stations.rotation[:, :1]], axis=1)
-    return np.linalg.lstsq(rows.reshape(-1, modal.mode_count), u.reshape(-1, u.shape[2]), rcond=None)[0].T
+    return np.linalg.lstsq(rows.reshape(-1, modal.mode_count), u, rcond=None)[0].T
 
 
 @kept
@@ -164,15 +164,11 @@ def constraint_violation(run: Run) -> Array:
 
 def reported_points(run: Run) -> dict[str, tuple[str, ...]]:
     """Names of the points of each body whose motion results contain, in the scene's order, by body or whole link."""
-    first = {link.names[0]: name for name, link in run.links.items()}
-    others = {name for link in run.links.values() for name in link.names[1:]}
-    points = {}
-    for body in run.model.scene.body:
-        if body.name in first:
-            points[first[body.name]] = tuple(run.links[first[body.name]].places)
-        elif body.name not in others:
-            points[body.name] = tuple(node_of(run, body.name).body.points)
-    return points
+    whole = {piece: name for name, link in run.links.items() for piece in link.names}
+    names = dict.fromkeys(whole.get(body.name, body.name) for body in run.model.scene.body)
+    return {
+        name: tuple(run.links[name].places if name in run.links else node_of(run, name).body.points) for name in names
+    }
 
 
 def point_names(run: Run) -> list[str]:
@@ -187,7 +183,12 @@ def node_of(run: Run, body: str) -> Node:
 
 @kept
 def _links(run: Run) -> dict[str, BodyMotion]:
-    return {name: _motion_of_link(run, link) for name, link in run.links.items()}
+    parts = [run.at(some) for some in in_parts(len(run.time) or 1, AT_ONCE)]
+    links = {}
+    for name, link in run.links.items():
+        of = BodyMotion(*map(np.concatenate, zip(*(_motion_of_link(part, link) for part in parts), strict=True)))
+        links[name] = of._replace(orientation=continuous(of.orientation))
+    return links
 
 
 def body_motion(run: Run, name: str) -> BodyMotion:
@@ -264,8 +265,7 @@ def deflection(run: Run, point: str) -> Array:
     name, _, label = point.partition(".")
     if name in run.links:
         frame, r = _links(run)[name], section_motion(run, point).r
-        in_frame = np.einsum("tji,tj->ti", of_quaternion(frame.orientation), r - frame.position)
-        return in_frame - run.links[name].points[label].position
+        return _seen_from(of_quaternion(frame.orientation), r - frame.position) - run.links[name].points[label].position
     node = node_of(run, name)
     return bent_section(node.body, label, run.q[:, node.p_q]).u - node.body.points[label].position
 
