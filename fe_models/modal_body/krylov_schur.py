@@ -143,7 +143,7 @@ class KrylovSchur:
 
     def _krylov_schur(self, count: int, tolerance: float) -> tuple[Array, Array]:
         """The same by SLEPc."""
-        size = ((self._rows, PETSc.DETERMINE), (self._rows, PETSc.DETERMINE))
+        size = ((self._rows, None), (self._rows, None))
         mass = PETSc.Mat().createPython(size, _Shell(self._mass), comm=self._comm)
         mass.setUp()
         solver = SLEPc.EPS().create(self._comm)
@@ -160,11 +160,8 @@ class KrylovSchur:
         transform.getKSP().getPC().setType(PETSc.PC.Type.PYTHON)
         transform.getKSP().getPC().setPythonContext(_Shell(self._flexibility))
         vector = mass.createVecRight()
-        if self._theta.size:
-            known = [vector.duplicate() for _ in self._theta]
-            for one, x in zip(known, self._X.T, strict=True):
-                one.array[:] = x
-            solver.setDeflationSpace(known)
+        known = [PETSc.Vec().createWithArray(x, comm=self._comm) for x in self._X.T.copy()]
+        solver.setDeflationSpace(known)
         solver.solve()
         if (found := solver.getConverged()) < count:
             raise SolveError(f"eigenproblem: {found} of {count} modes converged to {tolerance:g}: request fewer")
@@ -172,8 +169,8 @@ class KrylovSchur:
         for k in range(count):
             theta[k] = 1.0 / solver.getEigenpair(k, vector).real
             X[:, k] = vector.array_r
-        solver.destroy()
-        mass.destroy()
+        for used in (solver, transform, mass, vector, *known):  # PETSc keeps what Python alone lets go
+            used.destroy()
         return X, theta
 
     def _orthonormal(self, X: Array) -> Array:

@@ -48,7 +48,7 @@ class ScalarMass:
         factor.assemble()
         product = self.matrix.matMult(factor)
         result = np.array(product.getDenseArray(), order="C").reshape(U.shape)
-        for used in (factor, product):  # PETSc keeps what Python alone lets go
+        for used in (factor, product):
             used.destroy()
         return result
 

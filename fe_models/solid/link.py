@@ -125,7 +125,7 @@ def solid_modal_body(link: SolidLink, path: Path, progress: Progress, *, remesh:
         surface_patches=patches,
         remarks=tuple(solid.part.remarks),
     )
-    model.mass.matrix.destroy()  # PETSc keeps what Python alone lets go
+    model.mass.matrix.destroy()
     return body
 
 

@@ -1,6 +1,7 @@
 """The eigensolver of links: against closed forms, and against LAPACK for all modes of a small solid."""
 
 import os
+import weakref
 
 import numpy as np
 import pytest
@@ -67,6 +68,8 @@ def test_a_search_goes_on_where_it_ended(solver):
     assert found.lowest(4).shape == (300, 4)
     again = np.sum(omega2[:, None] * found.lowest(25) ** 2, axis=0)
     np.testing.assert_allclose(again, np.sort(omega2)[:25], rtol=1e-12)
+    found, at = None, weakref.ref(found._flexibility)
+    assert at() is None  # PETSc keeps what Python alone lets go
 
 
 @both
