@@ -78,11 +78,9 @@ def section_loads(placed: PlacedLayout, body: ModalBody, p: Array, voltages: Arr
     """
     layers = layers_on_link([placed], body)
     P = voltages @ layers.by_volts.T - p @ layers.by_modes.T
-    count = len(layers.points)
-    density = P.reshape(len(p), count, -1) / np.array([at.weight for at in layers.points])[:, None]
-    along = density[..., STRETCH] if density.shape[2] > 1 else np.zeros((len(p), count))
-    patch = np.array([at.interval for at in layers.points])
-    x = np.array([at.x for at in layers.points])
+    patch, x, weights, _ = map(np.array, zip(*layers.points, strict=True))
+    density = P.reshape(len(p), len(x), -1) / weights[:, None]
+    along = density[..., STRETCH] if density.shape[2] > 1 else np.zeros((len(p), len(x)))
     return SectionLoads(placed.edges, patch, x, density[..., 0], along, P @ layers.B)
 
 
@@ -251,7 +249,6 @@ class Effects(NamedTuple):
     # (k, K) charges, F, as sensors by voltages of the K patches of the link; open ones are clamped, but for the strains
     # that modes lack
     capacitance: Array
-    yielding: Array  # (k, K) charges by voltages, F, by strains that modes lack
 
 
 def effects(placed: Sequence[PlacedLayout], body: ModalBody) -> list[Effects]:
@@ -259,13 +256,15 @@ def effects(placed: Sequence[PlacedLayout], body: ModalBody) -> list[Effects]:
     found = [_straight(one, body) for one in placed]
     layouts, share = _each(placed)
     opened = np.array([of.electrodes == "open" for of in layouts])
-    layers = layers_on_link(placed, body)
-    lacking = (layers.straight - layers.by_volts).T @ layers.B
     C = np.diag([of.capacitance(clamped=of.electrodes == "open") for of in layouts] * share)
-    C += np.outer(opened, opened) * layers.yielding
+    Phi_V = np.concatenate([one.Phi_V for one in found])
+    if any(of.adds_stiffness for of in layouts):
+        layers = layers_on_link(placed, body)
+        Phi_V -= (layers.straight - layers.by_volts).T @ layers.B
+        C += np.outer(opened, opened) * layers.yielding
     ends = np.cumsum([len(one.edges) for one in placed])[:-1]
-    parts = zip(found, *(np.split(of, ends) for of in (lacking, C, layers.yielding)), strict=True)
-    return [one._replace(Phi_V=one.Phi_V - part, capacitance=c, yielding=of) for one, part, c, of in parts]
+    parts = zip(found, np.split(Phi_V, ends), np.split(C, ends), strict=True)
+    return [one._replace(Phi_V=per_volt, capacitance=c) for one, per_volt, c in parts]
 
 
 def _each(placed: Sequence[PlacedLayout]) -> tuple[list[PztLayout], Array]:
@@ -296,7 +295,7 @@ def _straight(placed: PlacedLayout, body: ModalBody) -> Effects:
             membrane /= 1.0 - (layout.poissons_ratio or 0.0)
         Phi_V = membrane[:, None] * _outlined(layout, body, edges)
     lever = lever / 2 if layout.bends == "twist" else np.ones(len(edges))
-    return Effects(extent, c, lever, turn, Phi_V, *np.zeros((2, 0, 0)))
+    return Effects(extent, c, lever, turn, Phi_V, np.zeros(0))
 
 
 def _stretches(

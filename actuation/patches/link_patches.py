@@ -6,6 +6,7 @@ torsion (fibers at an angle), axial modes (one named face). Modal forces on othe
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from ...mbs import _core
 from ...mbs.model.amplifiers import Amplifiers, joined
 from ...mbs.model.body import Body
 from ...mbs.model.divided_link import spread_of
-from .composite import SLIVER, Effects, PlacedLayout, effects
+from .composite import SLIVER, Effects, PlacedLayout, effects, layers_on_link
 from .patches import (
     PatchArray,
     Reach,
@@ -58,7 +59,7 @@ class LinkPatches:
     reach: Reach  # of all patches side by side on the modes that they reach together
     bodies: Mapping[str, OnBody]  # by name, the link and, where it is divided, its pieces
     slowness: float  # √(ρA/EI) of the link, s/m²
-    static: Array  # (k, k) charges, F, by the strains of voltages that drive a link without loads
+    of_modes: Array  # (k, k) part of `static` by strains of the modes, F
     # (n, n), without unit, from modal forces to the part that the equations keep; None: all of them
     on_kept: Array | None = None
 
@@ -82,6 +83,13 @@ class LinkPatches:
         """Amplifiers of the k patches, their capacitances on a link without loads."""
         of, driven = self.reach.amplifiers, driven_patches(self.arrays.values())
         return replace(of, capacitance=of.capacitance + driven[:, None] * self.static)
+
+    @cached_property
+    def static(self) -> Array:
+        """Charges (k, k), F, by the strains of voltages that drive a link without loads."""
+        arrays = [*self.arrays.values()]
+        layers = layers_on_link([PlacedLayout(of.layout, of.edges) for of in arrays], arrays[0].link)
+        return (layers.yielding + self.of_modes) * driven_patches(arrays)
 
     @property
     def edges(self) -> Array:
@@ -190,8 +198,8 @@ def link_patches(layouts: Sequence[PztLayout], body: ModalBody, spatial: Body) -
     bent = np.diff(body.stations.rotation[:, 1:], axis=0) ** 2 / np.diff(body.stations.position[:, 0])[:, None, None]
     softest = (bent.sum(axis=(0, 1)) / np.diag(body.stiffness)).max(initial=0.0)
     on_modes = spatial.modal_transform.T @ charge
-    static = np.concatenate([one.yielding for one in found]) + (on_modes.T / spatial.stiffness) @ on_modes
-    return LinkPatches(arrays, reach, own, float(np.sqrt(body.mass / body.length * softest)), static * driven)
+    of_modes = (on_modes.T / spatial.stiffness) @ on_modes
+    return LinkPatches(arrays, reach, own, float(np.sqrt(body.mass / body.length * softest)), of_modes)
 
 
 def check_reach(of_link: LinkPatches) -> None:
