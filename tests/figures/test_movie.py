@@ -31,7 +31,7 @@ def gif(results, tmp_path_factory):
         for k in range(movie.n_frames):
             movie.seek(k)
             assert movie.info["duration"] == 40  # ms
-            frames.append(np.asarray(movie.convert("RGB"), dtype=np.int16))
+            frames.append(np.asarray(movie.convert("RGB")))
         assert movie.info["loop"] == 0
     return np.array(frames)
 
@@ -74,9 +74,8 @@ def test_mp4_shows_the_same(gif, results, tmp_path):
     about = next(reader)
     assert about["size"] == PIXELS[::-1]
     assert about["fps"] == 25
-    frames = np.array([np.frombuffer(frame, np.uint8).reshape(*PIXELS, 3) for frame in reader], dtype=np.int16)
-    assert frames.shape == gif.shape
-    differences = np.array([np.abs(gif - frame).mean(axis=(1, 2, 3)) for frame in frames])
+    frames = (np.frombuffer(frame, np.uint8).reshape(*PIXELS, 3).astype(np.int16) for frame in reader)
+    differences = np.array([[np.abs(one - frame).mean() for one in gif] for frame in frames])
     assert (differences.argmin(axis=1) == np.arange(13)).all()  # each like its own frame more than like any other
     assert differences.diagonal().max() < 3.0  # of 255
 
@@ -116,11 +115,9 @@ SHORT = MovieOptions(seconds=FRAMES / 25, scale=1.0)
 def frames_of(path):
     with Image.open(path) as movie:
         assert movie.n_frames == FRAMES
-        found = []
         for k in range(FRAMES):
             movie.seek(k)
-            found.append(np.asarray(movie.convert("RGB"), dtype=float))
-    return found
+            yield np.asarray(movie.convert("RGB"), dtype=np.float32)
 
 
 def orange(frame):
@@ -162,7 +159,7 @@ def test_exaggeration_is_seen_and_told(arm_3r, tmp_path):
     for scale in (1.0, 20.0):
         path = tmp_path / f"{scale:g}.gif"
         write_motion(arm_3r.folder / "scene.results.h5", path, MovieOptions(seconds=FRAMES / 25, scale=scale))
-        pictures.append(frames_of(path))
+        pictures.append([*frames_of(path)][::3])
     true, large = pictures
     assert np.abs((true[0] - large[0])[:30, :480]).max() > 100  # the title
-    assert np.abs(orange(true[3]) - orange(large[3])).max() > 3.0
+    assert np.abs(orange(true[1]) - orange(large[1])).max() > 3.0
