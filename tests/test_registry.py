@@ -48,15 +48,13 @@ class Turntable(TimedAnalysis):
 
 EDITED = """
 import sys
-import types
+from importlib.util import module_from_spec, spec_from_file_location
 
 import numpy as np
 
-from edited import source
-module = types.ModuleType("{module}")
-module.__package__ = "{package}"
-sys.modules["{module}"] = module
-exec(source, module.__dict__)
+spec = spec_from_file_location("{module}", "edited.py")
+sys.modules["{module}"] = module = module_from_spec(spec)
+spec.loader.exec_module(module)
 
 import ffrobot
 from ffrobot.schema import schema
@@ -115,7 +113,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 
 from ffrobot.common.rotations import exponential, quaternions
-from ffrobot.mbs.fields.field_types import Vector2, Vector3
+from ffrobot.common.keys import Vector2, Vector3
 from ffrobot.mbs.fields.spelling import Spelled, place
 from ffrobot.mbs.joints.joint import Along, LoopEquation
 from ffrobot.mbs.joints.joint import AxialJoint
@@ -192,8 +190,8 @@ def solved_with(entry, module, own, program, folder):
     source = source.replace(before, after)
     name, content = own
     (folder / f"{name}.py").write_text(content, encoding="utf-8")
-    (folder / "edited.py").write_text(f"source = {source!r}\n", encoding="utf-8")
-    text = EDITED.format(module=module.__name__, package=module.__package__) + program
+    (folder / "edited.py").write_text(source, encoding="utf-8")
+    text = EDITED.format(module=module.__name__) + program
     done = subprocess.run([sys.executable, "-c", text], cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
 

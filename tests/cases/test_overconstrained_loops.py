@@ -16,7 +16,7 @@ B = A * np.sin(BETA) / np.sin(ALPHA)
 FACTOR = np.sin((BETA + ALPHA) / 2) / np.sin((BETA - ALPHA) / 2)  # tan(first/2) tan(second/2)
 END = 0.1
 ANALYSES = [
-    {"name": "inverse", "kind": "pcid", "end": END, "output_step": END / 200, "tolerance": 1e-6},
+    {"name": "inverse", "kind": "pcid", "end": END, "output_step": END / 400, "tolerance": 1e-6},
     {"name": "again", "kind": "forward", "actuation": "inverse", "apply": "joints", "tolerance": 1e-6},
 ]
 
