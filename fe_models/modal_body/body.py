@@ -224,11 +224,17 @@ def _inertia(body: ModalBody) -> Iterator[str]:
     about_center = np.trace(second) * np.eye(3) - second  # inertia of a mass on an interface may be about z alone
     spin = np.einsum("abc,bcn->an", LEVI_CIVITA, body.I_bar) - skew(center) @ S
     turning = spin.T @ np.linalg.pinv(about_center, POSITIVE_TOLERANCE, hermitian=True) @ spin
-    by_axis = np.einsum("kkab->kab", body.S_bar_kl) - np.einsum("ka,kb->kab", S, S) / body.mass
-    by_axis[2] -= 0.0 if body.S_spin is None else body.S_spin
     yield from _positive("second_moment, as inertia about the center of mass", about_center, np.abs(about_center).max())
     yield from _positive("modal_mass, less S_bar and I_bar", body.modal_mass - S.T @ S / body.mass - turning)
-    yield from _positive("S_bar_kl[k, k], less S_bar and S_spin", by_axis)
+    yield from _positive("S_bar_kl[k, k], less S_bar and S_spin", moving_along(body, body.S_spin))
+
+
+def moving_along(body: Integrals, S_spin: Array | None) -> Array:
+    """∫ρ φ_kᵀφ_k dV (3, n, n) along each axis k, less the mean φ_k: positive of modes φ of mass that exists."""
+    S = body.S_bar
+    each = np.einsum("kkab->kab", body.S_bar_kl) - np.einsum("ka,kb->kab", S, S) / body.mass
+    each[2] -= 0.0 if S_spin is None else S_spin
+    return each
 
 
 def _positive(name: str, matrix: Array, scale: float = 1.0) -> Iterator[str]:

@@ -14,7 +14,7 @@ import numpy as np
 from ...common.arrays import Array
 from ...common.errors import InputError
 from ...common.structs import struct
-from .body import IDENTITY_TOLERANCE
+from .body import POSITIVE_TOLERANCE, moving_along
 from .parts import LEVI_CIVITA, Interface, Invariants
 from .unit_loads import MOTIONS, PAIRS, inertia_wrenches, loads_at
 
@@ -65,8 +65,8 @@ def with_lumped_masses(integrals: Invariants, attached: Iterable[Lump]) -> Invar
         at = lump.at
         added = attached_integrals(lump.mass, at.position, lump.spread, at.translation, at.rotation)
         integrals = with_added(integrals, added)
-        across = integrals.S_bar_kl[2, 2] - integrals.S_spin
-        if np.linalg.eigvalsh(across).min(initial=0.0) < -IDENTITY_TOLERANCE * np.abs(across).max(initial=0.0):
+        lowest = np.linalg.eigvalsh(moving_along(integrals, integrals.S_spin)).min(initial=0.0)
+        if lowest < -POSITIVE_TOLERANCE:
             raise InputError(
                 f"interface.inertia of {lump.name}: expected moments of inertia of which none is larger than the sum"
                 " of the others",

@@ -114,7 +114,8 @@ def test_centrifugal_force_of_a_mass_stiffens_the_link_up_to_it(body):
 
 
 @pytest.mark.parametrize(
-    ("family", "inertia"), [("out-of-plane-bending", [3.0, 1.0, 1.0]), ("torsion", [1.0, 3.0, 1.0])]
+    ("family", "inertia"),
+    [("out-of-plane-bending", [3.0, 1.0, 1.0]), ("torsion", [1.0, 3.0, 1.0]), ("all", [0.0, 0.0, 1.0])],
 )
 def test_moments_of_inertia_that_no_body_has_are_refused(body, family, inertia):
     """∫ρη², half of what two exceed the third by, would be negative."""
