@@ -25,16 +25,16 @@ from ffrobot.mbs.scene.loads import Load
 KINDS = ("rigid", "solid", "beam", "supported beam", "stiffened solid", "stiffened beam")
 
 
+MOVING = [*((joint, 0) for joint in TYPES), *((joint, 1) for joint in ("revolute", "spherical", "universal"))]
+
+
 def kinds_of(joint, loops=0):
     """Points of loops have no geometric stiffness."""
     return ("rigid", "beam") if joint == "free" else KINDS[:4] if loops else KINDS
 
 
-@pytest.mark.parametrize("loops", [0, 1])
-@pytest.mark.parametrize("joint", TYPES)
+@pytest.mark.parametrize(("joint", "loops"), MOVING)
 def test_derivatives_are_those_of_evaluations(joint, loops):
-    if loops and joint not in ("revolute", "spherical", "universal"):
-        pytest.skip("random loops of these are rigid")
     rng = np.random.default_rng(TYPES.index(joint))
     motion, system = moving(rng, [joint] * 3, kinds_of(joint, loops), loops=loops)
     tree, q, v = motion.model.tree, motion.q[0], motion.v[0]
@@ -96,12 +96,9 @@ def test_derivatives_with_a_force_of_the_motion(joint):
         assert np.abs(getattr(without, key) - expected).max() > 1e3 * np.abs(difference).max()
 
 
-@pytest.mark.parametrize("loops", [0, 1])
-@pytest.mark.parametrize("joint", TYPES)
+@pytest.mark.parametrize(("joint", "loops"), MOVING)
 def test_the_motion_itself_is_one_of_the_motions_beside_it(joint, loops):
     """Begun a little later, a free motion is δ = v, δs̈ the rate of its accelerations."""
-    if loops and joint not in ("revolute", "spherical", "universal"):
-        pytest.skip("random loops of these are rigid")
     motion, system = moving(
         np.random.default_rng(20 + TYPES.index(joint)), [joint] * 3, kinds_of(joint, loops), loops=loops
     )
