@@ -197,8 +197,10 @@ def _problems(body: ModalBody) -> Iterator[str]:
     if k < 2 or np.any(np.diff(body.stations.position[:, 0]) <= 0):
         yield "stations.position: expected at least two, ascending in x"
     first, last = body.stations.position[[0, -1], 0]
-    if not first <= body.length / 2 <= last:
-        yield f"length: expected a middle between the first and the last station, found {body.length} m"
+    way = np.linalg.norm(body.interfaces["tip"].position - body.interfaces["root"].position)
+    error = min(abs(body.length - last + first), abs(body.length - way))
+    if not error <= INTERFACE_TOLERANCE * body.length or not first <= body.length / 2 <= last:
+        yield f"length: expected {last - first:g} m, from first to last station, found {body.length} m"
     element = body.stations.element
     if element is not None and not _is_chain(element, k):
         yield "stations.element: expected four ascending stations for each element, from the first to the last"

@@ -285,6 +285,13 @@ def test_a_symmetric_part_in_both_integrals_is_left_out(bodies):
     assert max(differences(integrals_of(body), integrals_of(back), vars(integrals_of(body))).values()) < 1e-11
 
 
+@pytest.mark.parametrize("name", ["Ct", "Gr", "Ge"])
+def test_integrals_that_contradict_each_other_are_told(name, bodies):
+    head, inside, tail = re.split(rf"(?s)(\n\s+{name}\n.*?end {name}\n)", sid_text(bodies["cloud"])[0], maxsplit=1)
+    _, remarks = read_sid(head + inside.replace("m0( 1, 2)", "m0( 1, 3)") + tail, "cloud")  # (1, 2) is left empty
+    assert [text.split(":")[0] for text in remarks if " off " in text] == [name]
+
+
 def test_modal_masses_of_few_digits():
     """A line of masses without inertia about its axis, shapes of five digits: sums are taken, and that is told."""
     n, x = 11, np.linspace(0.0, 1.0, 11)

@@ -139,24 +139,28 @@ def _symmetric_part(slope: Array, Me: Array) -> Array | None:
     return symmetric if np.abs(symmetric).max(initial=0.0) > 0.5 * LARGEST_ASYMMETRY * scale else None
 
 
-def _is_in_both(modal: "Modal", slope: Array) -> bool:
-    """Whether G_e has twice the symmetric part of C_r: geometric stiffness is in C_r alone."""
+def _Ge_by_axis(modal: "Modal", expected: Array) -> Array:
+    """G_e (3, n, n) in the order of columns that is nearer to `expected` (3, n, n)."""
     n = modal.modes
     Ge = modal["Ge", (n, 3 * n)].m0
     layouts = (Ge.reshape(n, 3, n).transpose(1, 0, 2), Ge.reshape(n, n, 3).transpose(2, 0, 1))
-    twice = slope + slope.transpose(0, 2, 1)
-    parts = (0.5 * (each + each.transpose(0, 2, 1)) for each in layouts)
-    return any(np.abs(part - twice).max() < SAME * np.abs(twice).max() for part in parts)
+    return min(layouts, key=lambda each: float(np.abs(each - expected).max()))
+
+
+def _is_in_both(modal: "Modal", slope: Array) -> bool:
+    """Whether G_e has twice the symmetric part of C_r: geometric stiffness is in C_r alone."""
+    Ge, twice = _Ge_by_axis(modal, 2 * slope), slope + slope.transpose(0, 2, 1)
+    return bool(np.abs(0.5 * (Ge + Ge.transpose(0, 2, 1)) - twice).max() < SAME * np.abs(twice).max())
 
 
 def _checks(modal: "Modal", integrals: ShapeIntegrals) -> Iterator[str]:
     """A line for each quantity that the file has twice, where the two differ."""
     n = modal.modes
     Gr = modal["Gr", (3, 3 * n)].m0
-    slope = integrals.inertia_slope
+    slope, of_Cr = integrals.inertia_slope, modal["Cr"].m1.transpose(2, 0, 1)
     layouts = (Gr.reshape(3, n, 3).transpose(0, 2, 1), Gr.reshape(3, 3, n))
     parts = [(each + each.transpose(1, 0, 2)) / 2 for each in layouts]
-    symmetric = _symmetric_part(modal["Cr"].m1.transpose(2, 0, 1), integrals.modal_mass)
+    symmetric = _symmetric_part(of_Cr, integrals.modal_mass)
     if symmetric is not None:
         yield (
             f"Cr, Ge: both have a symmetric part, {np.abs(symmetric).max():.2g} in m1 of Cr, which ∫ρΦᵀe~Φ cannot have"
@@ -165,6 +169,7 @@ def _checks(modal: "Modal", integrals: ShapeIntegrals) -> Iterator[str]:
     identities = (
         ("Gr: symmetric part", min(parts, key=lambda part: np.abs(part - slope).max()), slope, "the slope of J"),
         ("Ct:", modal["Ct", (n, 3)].m0, integrals.S_bar.T, "the slope of mdCM"),
+        ("Ge:", _Ge_by_axis(modal, 2 * of_Cr), 2 * of_Cr, "twice m1 of Cr"),
         ("Oe:", modal["Oe"].m0, integrals.centrifugal, "−½ and −1 times the slope of J"),
     )
     for name, given, expected, what in identities:
