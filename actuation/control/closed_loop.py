@@ -63,7 +63,8 @@ class LoopTask:
             read = tuple(replace(of, by_volts=0.0) if of.name in balanced else of for of in merged(read, needed))
         else:
             tip = analysis.tip or default_tip(robot.model)
-            estimated = merged(signals(estimated_sensors(robot, analysis.controller, tip)), ())
+            found = merged(signals(estimated_sensors(robot, analysis.controller, tip)), ())
+            estimated = tuple(replace(of, by_volts=0.0) for of in found)  # balanced patches
         self.sensing, self.ideal = Sensing(plant, read), Sensing(plant, estimated)  # ideal: what an observer estimates
         self.amplifiers = amplifiers_on(plant, context.patches)
         self.ranges = command_ranges(context.model, context.patches)
