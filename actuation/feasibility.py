@@ -329,16 +329,20 @@ def judge_actuators(
 
     `patches` are by link, `voltages` by layout. Links among `others` need no modal forces of patches.
     """
-    judged: dict[str, PatchFeasibility] = {}
+    judged, every = dict[str, PatchFeasibility](), dict(voltages)  # with voltages of loads
+    for load in run.model.scene.load:
+        if load.pzt is not None:
+            given = np.transpose([of.sample(run.time)[0] for of in load.voltage or ()])
+            every[load.pzt] = replace(every[load.pzt], required=every[load.pzt].required + given)
     for body, of_link in patches.items():
-        link, required = links[body], np.hstack([voltages[name].required for name in of_link.arrays])
+        link, required = links[body], np.hstack([every[name].required for name in of_link.arrays])
         charge = required @ amplifiers_on(run.model, {body: of_link}).capacitance + link.p @ of_link.Phi_V
         for name, array in of_link.arrays.items():
             if not array.layout.is_driven:
                 continue
             trial = None if run.analysis.is_repeated else partial(_largest_voltage, run, link, array.layout)
             own, F_p = charge[:, of_link.columns(name)], array.modes.forces(link.F_p)
-            judged[name] = judge_patches(array, voltages[name], own, run.time, link.p, F_p, with_count=trial)
+            judged[name] = judge_patches(array, every[name], own, run.time, link.p, F_p, with_count=trial)
     return Feasibility(judge_motors(run), judged, find_unsupplied(run, links, patches, voltages, others))
 
 

@@ -62,6 +62,14 @@ def test_patches_peak_by_peak():
     assert np.all(judged.strain == 0.0)  # held straight
 
 
+def test_voltages_of_loads_count_in_the_verdict():
+    """As many patches as modes: what loads supply need not be found, and the sum stays."""
+    load = {"pzt": "link", "voltage": ["150*sin(9*t)"] * 10}
+    alone, beside = (judged_of(arm(load=of)).patches["link"] for of in ((), [load]))
+    for name in ("required_moment", "factor", "slew", "current"):
+        np.testing.assert_allclose(getattr(beside, name), getattr(alone, name), rtol=1e-6)
+
+
 def test_strain_under_a_static_load_is_that_of_the_beam():
     """ε = (t_b/2 + t_p) M(x)/EI with M of the weight, averaged along the patch (Euler–Bernoulli)."""
     solution = arm(STRAIGHT | {"shape": "static"}, "0")
