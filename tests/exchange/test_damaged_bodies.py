@@ -58,6 +58,8 @@ CHANGES = {
     "size": (".SID_FEM", r"(phi\n(?:.*\n){2}\s*ncol\s*=)\s*\d+", r"\g<1> 1", r"phi: expected a matrix of 3 × \d+"),
     "symmetry": (".SID_FEM", r"(phi\n(?:.*\n){5}\s*structure\s*=)\s*\d+", r"\g<1> 2", r"phi: expected a square matrix"),
     "interface": (".SID_FEM", r"tip=\d+", "tip=99", 'expected NAME=NUMBER of nodes in the file, found "tip=99"'),
+    "node twice": (".SID_FEM", r"(new node +=) +2\b", r"\g<1> 1", "frame: expected nodes with a number each"),
+    "number twice": (".fem", r"(NODE LIST\n1) 2", r"\g<1> 1", r"record 2: expected \d+ different numbers of nodes"),
     "end": (".SID_FEM", " end part", "", "expected `end part`"),
     "object": (".SID_FEM", r"(?s)\n +Oe\n.*?end Oe", "", "expected the object Oe in modal, found none"),
     "no stiffness": (".SID_FEM", r"(?s)Ke\n(.*?)m0\(.*?end Ke", r"Ke\n\1end Ke", "a positive stiffness"),

@@ -79,6 +79,8 @@ def read_fem(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
     records = _records(text)
     labels = [int(value) for value in _numbers(records, 2)]
     count = len(labels)
+    if len(set(labels)) < count:
+        raise InputError(f"record 2: expected {count} different numbers of nodes", len(set(labels)))
     x = np.stack([_numbers(records, k, count) for k in (5, 6, 7)], axis=1)
     shapes = _numbers(records, 8)
     modes, rest = divmod(len(shapes), 6 * count)

@@ -79,8 +79,8 @@ def read_sid(text: str, name: str) -> tuple[ModalBody, tuple[str, ...]]:
     modal = Modal(next((one for one in part.inside if one.name == "modal"), None) or part["modal"])
     integrals = _integrals(modal)
     nodes = {int(node.number("number")): _interface(modal, node) for node in modal.nodes}
-    if not nodes:
-        raise InputError("frame: expected at least one node", "none")
+    if not 0 < len(nodes) == len(modal.nodes):
+        raise InputError("frame: expected nodes with a number each", f"{len(nodes)} numbers of {len(modal.nodes)}")
     body, remarks = modal_body(name, integrals, nodes, head)
     return body, (*remarks, *_turned_nodes(modal), *_checks(modal, integrals))
 
