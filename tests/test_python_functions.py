@@ -1,6 +1,8 @@
 """Functions of Python and compiled ones in place of expressions."""
 
+import gc
 import math
+import weakref
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,7 +11,7 @@ from tables_3d import pin, planar
 
 import ffrobot
 from ffrobot.mbs.fields.expressions import parse_expression
-from ffrobot.mbs.fields.functions import check_derivatives, user_function
+from ffrobot.mbs.fields.functions import check_derivatives, state_function, user_function
 
 SINE = "void sine(double t, double *out) { out[0] = 0.5 * sin(t); out[1] = 0.5 * cos(t); out[2] = -out[0]; }"
 
@@ -35,6 +37,17 @@ def test_functions_are_as_good_as_expressions(compiled):
     expected = moment(swing())
     np.testing.assert_allclose(moment(swing(sine)), expected, rtol=1e-12)
     np.testing.assert_allclose(moment(swing(compiled("sine", SINE))), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("made_of", [user_function, state_function])
+def test_compiled_functions_outlive_their_names(made_of):
+    """Where they are made inside a function of the user, machine code may go with the object that has the address."""
+    function = type("Compiled", (), {"address": 4096})()  # nothing calls it
+    known = weakref.ref(function)
+    made_of(function)
+    del function
+    gc.collect()
+    assert known() is not None
 
 
 def test_load_needs_the_value_alone():

@@ -23,6 +23,7 @@ def user_function(function: object) -> TimeFunction:
     """
     address = getattr(function, "address", None)
     if isinstance(address, int):
+        _compiled.append(function)
         return TimeFunction.compiled(address)
     if not callable(function):
         raise ValueError(f"expected a function of t, found {function!r}")
@@ -38,6 +39,9 @@ def user_function(function: object) -> TimeFunction:
         return value, rate, acceleration
 
     return TimeFunction.python(three)
+
+
+_compiled = list[object]()  # machine code must outlive the scenes that know its address
 
 
 def called(function: Callable[..., object], t: float, *arguments: object) -> Array:
@@ -142,6 +146,7 @@ def state_function(function: object, *, is_planar: bool = True) -> StateFunction
     """
     address = getattr(function, "address", None)
     if isinstance(address, int):
+        _compiled.append(function)
         return StateFunction.compiled(address, is_planar)
     if not callable(function):
         raise ValueError(f"expected a function of t, position and velocity, found {function!r}")
