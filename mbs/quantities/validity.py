@@ -247,7 +247,8 @@ class Bending:
     def in_words(self) -> str:
         """Text on deflection, change of stiffness and buckling."""
         stiffening = "with geometric stiffening" if self.is_stiffened else "geometric stiffening is off"
-        times = f" and are {self.buckling:.3g} times those under which it buckles" if self.buckling >= 1.0 else ""
+        many = f"{self.buckling:.3g} times those under which it buckles, if they keep their directions"
+        times = f" and are {many}" if self.buckling >= 1.0 else ""
         return (
             f"bends by {_percent(self.deflection)} of its length, loads change its stiffness by"
             f" {_percent(self.stiffness_change)}{times} ({stiffening})"
