@@ -257,7 +257,9 @@ class AnalysisResult:
     def notes(self) -> tuple[str, ...]:
         """Properties of correct results, a text each."""
         model = self.run.model
-        texts = () if self.sharing is None else (self.sharing.in_words,)
+        texts: tuple[str, ...] = () if self.sharing is None else (self.sharing.in_words,)
+        if self._is_integrated and model.scene.trajectory and not (of := self.analysis).follows_trajectories:
+            texts += () if of.source else ("without actuation it does not follow the trajectories",)
         if self.run.is_prescribed and model.tree.loops and not model.motors:
             return (*texts, "no motors, so no torques: joints of kinematic loops have motors with motor = true alone")
         return texts

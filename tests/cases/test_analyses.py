@@ -7,7 +7,7 @@ import pytest
 from checkpoint_mechanisms import load
 from checkpoint_scene_files import close, solved, write_scene
 from robots_3d import random_scene_in_3d
-from tables_3d import Y, revolute, rigid, scene
+from tables_3d import Y, pin, planar, revolute, rigid, scene
 
 import ffrobot
 
@@ -158,3 +158,15 @@ def test_joints_beside_a_path_start_in_an_equilibrium_that_is_told(guess, angle,
     np.testing.assert_allclose(results["inverse/joints/B/coordinate"][0], angle, atol=1e-9)
     found = [text for text in results.warnings["inverse"] if "hang, away" in text or "unstable" in text]
     assert [told in text for text in found] == ([True] if told else [])
+
+
+def test_a_run_beside_the_trajectories_says_so():
+    """It starts at zero and stays there, whatever the path."""
+    bar = {"mass": 1.0, "inertia": 0.1, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0], "tip": [0.5, 0.0]}}
+    keys = {"trajectory": [{"name": "turn", "joint": "j", "value": "0.2 + t"}], "gravity": [0.0, 0.0]}
+    free = {"name": "free", "kind": "forward", "end": 0.1, "output_step": 0.1}
+    with ffrobot.solve(
+        ffrobot.make_scene(**planar([{"name": "a", "rigid": bar}], [pin("j", "ground", "a.root")], free, **keys))
+    ) as results:
+        assert results.notes == {"free": ["without actuation it does not follow the trajectories"]}
+        assert not results["free/joints/j/coordinate"].any()
