@@ -74,8 +74,7 @@ def check_output(path: Path, file_format: str) -> None:
     `file_format`, or one too damaged to tell.
     """
     _check_no_folder(path, "output")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: output: expected a file in a folder that exists", f"no folder {path.parent}")
+    check_parent(path)
     replaceable = ("empty", "unreadable", f"HDF5 {file_format}", DAMAGED)
     if path.exists() and not (path.is_file() and kind_of_file(path) in replaceable):  # no device, ever
         raise InputError(
@@ -87,6 +86,13 @@ def check_output(path: Path, file_format: str) -> None:
             pass
     except OSError as error:
         raise InputError(f"{path}: output: expected a writable folder, found: {error.strerror or error}") from None
+
+
+def check_parent(path: Path) -> None:
+    """Raise `InputError` for an output in a folder that does not exist, or that is an input."""
+    check_not_an_input(path)
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: output: expected a file in a folder that exists", f"no folder {path.parent}")
 
 
 def _check_no_folder(path: Path, label: str) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from rich.console import Console
 
 from ..common.errors import InputError, check_known, either, naming, quoted
-from ..common.files import check_new_file, check_new_folder, check_output, holds, write_atomically
+from ..common.files import check_new_file, check_new_folder, check_output, check_parent, holds, write_atomically
 from ..common.outputs import check_not_an_input
 from ..common.tables import shown
 from ..common.toml_files import read_text
@@ -119,7 +119,7 @@ def export_file(
         raise InputError(f"{path}: --side: expected it with {either(SIDED)} only", file_format)
     suffix, make = known[file_format]
     if output is not None:
-        check_not_an_input(output)
+        check_parent(output)
     content, what, remarks, name = make(path, analysis, side or "motor")
     target = output or path.with_suffix(f".{name}{suffix}" if name else suffix)
     write_content(target, content, force=force)

@@ -322,3 +322,5 @@ def test_commands(tmp_path, ffrobot, refused, bodies):
         ("csv", 'expected one of "sid", "mbdyn", "craig-bampton", "exudyn" of a modal body, found "csv"'),
     ):
         assert message in refused(tmp_path, "export", "arm.h5", "--format", file_format)
+    told = refused(tmp_path, "export", "arm.h5", "--format", "craig-bampton", "-o", "none/arm.npz")  # before it is made
+    assert "expected a file in a folder that exists, found no folder none" in told
