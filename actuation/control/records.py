@@ -157,16 +157,20 @@ class FilterRecord(Record):
     @property
     def points(self) -> dict[str, str]:
         """Points "BODY.POINT" at which forces are inputs, as keys and values."""
-        return {reference.name: reference.name for reference in FilterRecord.references(self)}
+        return {of.name: of.name for of in FilterRecord.references(self) if of.kind == "body"}
 
     def references(self) -> Iterator[Reference]:
-        """Yield references to points at which forces are inputs."""
+        """Yield references to points at which forces are inputs, to patches, and to joints of one coordinate."""
         for key in ("process", "disturbance"):
             for name in getattr(self, key):
                 kind, _, rest = name.partition("/")
-                point = rest.rpartition("/")[0]
-                if kind == "force" and "." in point:
-                    yield Reference(key, point)
+                subject = rest.rpartition("/")[0]
+                if kind == "force" and "." in subject:
+                    yield Reference(key, subject)
+                elif kind == "pzt":
+                    yield Reference(key, subject, "patches")
+                elif kind == "joint" and rest[-2:-1] != " ":
+                    yield Reference(key, rest, "joint")
 
 
 class KalmanRecord(ObserverRecord, FilterRecord):
