@@ -20,6 +20,7 @@ STEP = 1e-3  # of ln θ, on both sides: frequencies of finite elements are known
 NO_EFFECT = 1e-4  # of a parameter, or a combination, against the largest: differences have errors of 1e-6
 SHARE = 0.1  # of the largest: entries of a combination that are named
 MOST_EVALUATIONS = 100
+ANOTHER = 0.1  # error of a frequency, relative, as of another mode
 FEW = 30  # degrees of freedom below which 95 % is more than two standard deviations
 UNSEEN = 0.5  # relative deviation of a parameter from which the measurement hardly determines it
 ALIKE = 0.95  # correlation of errors from which parameters are hardly distinguishable
@@ -135,6 +136,8 @@ class Fit(Parameters):
                 " or more modes, make it narrower"
             )
         yield from super().remarks()
+        if (worst := np.abs(self.error).max()) > ANOTHER:
+            yield f"errors of up to {100 * worst:.0f} %: does a mode missing in the table shift the numbers of others?"
         if self.misfit > 2.0:
             yield (
                 f"the remaining errors are {self.misfit:.3g} times the uncertainties: the model lacks something that no"

@@ -66,6 +66,10 @@ def test_stiffness_and_density_of_a_link_with_a_known_mass(write, tmp_path):
     fit = ffrobot.fit_measured(write(tip=0.1), measured, ["material.youngs_modulus", "material.density"])
     np.testing.assert_allclose(fit.value, [66e9, 2900.0], rtol=1e-6)
     text = (tmp_path / "arm.fitted.toml").read_text()
+    shifted = table(tmp_path / "modes.csv", truth.frequency[[0, 2, 3]])  # the second one was not found
+    off = ffrobot.fit_measured(write(tip=0.1), shifted, ["material.youngs_modulus"], force=True)
+    told = [any("missing in the table" in line for line in one.remarks()) for one in (fit, off)]
+    assert told == [False, True]
     assert "# of the data sheet" in text
     assert tomllib.loads(text)["material"]["density"] == pytest.approx(2900.0, rel=1e-6)
 
