@@ -1,8 +1,7 @@
-"""A beam link cut into pieces of equal length, each a link of its own: for deflections too large for one frame.
+"""A beam link cut into pieces of equal length, each a link of its own, for large deflections.
 
-Deflections within a piece are 1/N² of those within the link. Pieces are simply supported, with one eigenmode (in
-space one of each plane of bending) and the static shapes of what their neighbors do to them: a frame between the ends
-of a piece turns with it, and leaves small deflections and few steps (docs/theory.md, Subdivided links).
+docs/theory.md, Subdivided links: pieces are simply supported, with one eigenmode (in space one of each plane) and the
+static shapes of what their neighbors do to them.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,22 +1,9 @@
 """Patches as layers of their link: the composite section with its modes, what a volt does, what patches add. SI units.
 
-Under the strains e = (φ_z', u', φ_x', −φ_y') of the axis and a voltage V the layers at one place take the loads
-
-    P = f V − C e
-
-(`layer_loads`; Crawley and de Luis, AIAA J. 25, 1987, 1373–1385). The modes lack the steps of curvature at the ends of
-patches. These residual strains are static and known: a load in one section of an isostatic link strains that section
-alone, by 1/EI, 1/EA, 1/GJ, of which the modes, with strains B p, have B K⁻¹ Bᵀ. At Gauss points of weights w, with C
-and f for the length w of each,
+docs/theory.md, eqs. 32 to 34 and Patches in 3D, with strains e = (φ_z', u', φ_x', −φ_y') of the axis. Layers take the
+loads P = f V − C e (`layer_loads`); at Gauss points of weights w, with C and f for the length w of each,
 
     e = B p + R P,    R = diag(1/(w EI), 1/(w EA) …) − B K⁻¹ Bᵀ,    P = (1 + C R)⁻¹ (f V − C B p)
-
-so that the patches add the stiffness Bᵀ (1 + C R)⁻¹ C B to the link and have the modal forces Bᵀ (1 + C R)⁻¹ f V.
-Layouts of one link are coupled by its modes.
-
-Patches without a named face only bend (or twist): they are on one face, and all other strains of the section are free,
-which shifts the neutral axis. On named faces they interact with all strains: those on one face stretch the link, too,
-and those off the middle of the width bend it about both axes.
 """
 
 from collections.abc import Iterator, Sequence

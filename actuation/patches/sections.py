@@ -1,12 +1,7 @@
-"""The bare sections of a link under patches, and the loads of layers on them. SI units.
+"""The bare sections of a link under patches, and the loads of layers on them (docs/theory.md, eqs. 35, 36). SI units.
 
-Layers at the distance η from the axis strain as the section does,
-
-    ε = u' − η κ − ζ κ_t,    γ = β |η| φ_x'
-
-with the curvatures κ towards their normal and κ_t across it, ζ across the width and β of `LinkSections.shear_lever`.
-Their stress is C (ε, γ) − C Λ V (`Lamina`), their loads on the section, by virtual work, ∫ Bᵀ (C Λ V − C B e) dA with
-the rows B of these strains. Voltages on both faces are opposite to bend, and alike to twist.
+Layers at the distance η from the axis and ζ across the width strain as the section does: ε = u' − η κ − ζ κ_t,
+γ = β |η| φ_x' with β of `LinkSections.shear_lever`. Voltages on both faces are opposite to bend, and alike to twist.
 """
 
 from functools import cached_property, lru_cache

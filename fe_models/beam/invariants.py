@@ -3,10 +3,7 @@
 The stations are the Gauss–Lobatto points of cubic elements, so values at stations *are* the degrees of freedom of
 the fields and every integral is a product with a mass matrix, without error.
 
-Geometric stiffness is the work of the section forces n, m of a unit load when the beam bends, twists and stretches
-(docs/theory.md, eq. 48). With the rotations Th = (φ, θ_y, θ_z) and strains Γ = (u', v' − θ_z, w' + θ_y),
-
-    pᵀK p = −∫ n·(Th × (Th × e1) + 2 Th × Γ) + m·(Th × Th') dx
+Geometric stiffness is that of docs/theory.md, eq. 48, with rotations Th = (φ, θ_y, θ_z) and strains Γ.
 """
 
 from collections.abc import Mapping, Sequence

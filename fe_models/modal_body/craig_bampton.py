@@ -1,11 +1,7 @@
 """Craig–Bampton: a link by the motion of its interfaces and by modes of the link fixed at all of them. NumPy only.
 
-    u = Σ ψ_c q_c + Σ φ_k η_k
-
-with constraint modes ψ, the static shapes of unit motions of one interface coordinate q while the others rest, and
-eigenmodes φ of the link fixed at all interfaces (docs/theory.md, Craig–Bampton). The frame moves with the root, by r;
-the other interfaces move by d = q − R r relative to it, R being their rigid motion. The link has the modes of the
-floating frame, coordinates p, that span ψ and φ; p = T (d, η) follows from their motion at the interfaces.
+docs/theory.md, eqs. 10 and 11: the frame moves with the root, the other interfaces move by d = q − R r relative to it.
+The link has the modes of the floating frame, coordinates p; p = T (d, η) follows from their motion at the interfaces.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -1,9 +1,8 @@
 """The lowest modes of a supported link by SLEPc's Krylov–Schur: shift-and-invert at zero. Loads PETSc and SLEPc.
 
-PETSc sees the flexibility as the preconditioner of an exact solve, and the mass as a matrix that only multiplies. Modes
-found before are deflated: a search goes on where it ended, and one for what is left tells whether one of several alike
-is missing, which no single Krylov space shows. SLEPc solves for one vector at a time, block Lanczos (docs/theory.md)
-for several, which reads the factors of a large solid once.
+PETSc sees the flexibility as the preconditioner of an exact solve, and the mass as a matrix that only multiplies. A
+search goes on where it ended, with the modes found deflated; whether one of several alike is missing, which no single
+Krylov space shows, one for what is left tells (docs/theory.md, Finite elements of a link).
 """
 
 from collections.abc import Callable

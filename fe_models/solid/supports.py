@@ -1,12 +1,7 @@
-"""Supports of a solid, and its flexibility F under these: displacements u = F f by loads f.
+"""Supports of a solid, and its flexibility F under these: displacements u = F f by loads f (docs/theory.md, eq. 8).
 
-    F = P (K_0⁻¹ + W S⁻¹ Wᵀ) Pᵀ,   S = WᵀKW,   P = I − R (B R)⁻¹ B
-
-(docs/theory.md, eq. 8) with rigid faces (RBE2) clamped in K_0, W the displacements under their unit motions, six
-springs in K_0 in place of mean supports B u = 0, and rigid motions R of the body: only sparse symmetric positive
-definite matrices are factorized and B never fills one.
-
-Factors are MUMPS' Cholesky factors of an upper triangle, in memory or, of large ones, in files.
+Only sparse symmetric positive definite matrices are factorized, and B never fills one. Factors are MUMPS' Cholesky
+factors of an upper triangle, in memory or, of large ones, in files.
 """
 
 import os

@@ -4,9 +4,8 @@ Numbers are varied by SLSQP or trust-constr with gradients, from the scene's own
 hypercube; catalogs, and rough responses, by differential evolution or enumeration. Gradients with error estimates
 judge the best design by conditions of optimality.
 
-The Pareto front of two responses is found by the ε-constraint method (Haimes, Lasdon & Wismer 1971). Its ends are the
-best designs for each response alone. Between them the second response is limited, in equal ratios if both ends have
-one sign. Each search begins at its neighbor's design.
+The Pareto front of two responses is found by the ε-constraint method (Haimes, Lasdon & Wismer 1971). Each search begins
+at its neighbor's design.
 """
 
 from collections.abc import Iterator, Sequence

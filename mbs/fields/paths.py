@@ -1,9 +1,6 @@
 """Motions made of polynomials: laws from rest to rest, paths through waypoints with holds, input shapers.
 
-Two families of laws s(t) from 0 to 1. A polynomial whose first m derivatives vanish at both ends; and a step that is
-averaged over times T₁ ≥ T₂ ≥ … one after the other, which makes a trapezoid of speeds of two of them, an S-curve with
-limited jerk of three (Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots, 2008, sec. 4.4:
-speed is at most h/T₁, acceleration h/(T₁T₂), jerk h/(T₁T₂T₃)).
+Laws s(t) from 0 to 1 are polynomials, or a step that is averaged over times T₁ ≥ T₂ ≥ … (docs/theory.md, Paths).
 """
 
 from collections.abc import Sequence

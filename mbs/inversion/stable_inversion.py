@@ -1,8 +1,7 @@
 """Stable inversion: the bounded p(t) for which motors alone carry a path (Devasia, Chen and Paden 1996; Seifried 2014).
 
-Where zeros lie in the right half plane, collocation solves a two-point problem (docs/theory.md, Torque-only tracking),
-on intervals that are divided where r(t) ≠ 0 between the collocation points. Without such zeros it is an initial value
-problem, solved window by window, each with intervals as short as r(t) requires.
+Where zeros lie in the right half plane, collocation solves a two-point problem (docs/theory.md, Torque-only tracking).
+Otherwise it is an initial value problem, solved window by window.
 """
 
 from collections.abc import Callable, Iterable

@@ -1,8 +1,8 @@
 """Errors of too few eigenmodes, estimated by attachment modes, and of chains of stiffened pieces. SI units.
 
-The ends of a piece are in its equations to second order in its modal coordinates p (`model.body`). A rod with the same
-strains ends where its sections, each turned from the last, take it (Simo, Comput. Methods Appl. Mech. Eng. 49, 1985).
-The difference of the ends, carried to the end of the chain, is the estimate: docs/theory.md, Limits.
+Pieces end to second order in their modal coordinates p (`model.body`), rods with the same strains where their sections
+take them (Simo, Comput. Methods Appl. Mech. Eng. 49, 1985). The difference, carried to the end of the chain, is the
+estimate: docs/theory.md, Limits.
 """
 
 from collections.abc import Mapping

@@ -2,9 +2,7 @@
 
 docs/theory.md, Motors and patches together, has the problem, with compliant gears and a path tolerance. Each Newton
 step solves its linearized equations for the least effort (43), or the least share of limits of voltages, currents
-(|C V̇ + Φ_Vᵀ ṗ| ≤ i_max) or torques. On each interval p̈ is a polynomial through the four Gauss points of `collocation`,
-V (with compliant gears V̈) and the path error's ë are linear. Intervals are graded at first, halved until the least
-voltage settles, divided until no residual force is left.
+(|C V̇ + Φ_Vᵀ ṗ| ≤ i_max) or torques.
 """
 
 from dataclasses import replace
