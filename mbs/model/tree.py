@@ -322,7 +322,7 @@ def _unwound(angle: Array, rate: Array, times: Array, guess: float) -> tuple[Arr
     """The angle (T,) with full turns: each the nearest to where the rates lead from the one before.
 
     Rates lead there by cubics with the slopes of their differences. Turns are counted where these are near the
-    trapezoidal rule and the angle found.
+    trapezoidal rule and the angle found; of two outputs, up to a quarter turn.
     """
     if len(times) < 2:
         return angle + 2 * np.pi * np.round((guess - angle) / (2 * np.pi)), True
@@ -331,5 +331,6 @@ def _unwound(angle: Array, rate: Array, times: Array, guess: float) -> tuple[Arr
     way = rough - h**2 * np.diff(slope) / 12
     turns = np.round((np.append(guess, way) - np.append(angle[0], np.diff(angle))) / (2 * np.pi))
     whole = angle + 2 * np.pi * np.cumsum(turns)
-    off = np.abs(way - np.array([rough, np.diff(whole)])).max()
+    known = rough if len(times) > 2 else 0.0 * rough  # two outputs tell nothing of rates between them
+    off = np.abs(way - np.array([known, np.diff(whole)])).max()
     return whole, bool(off < np.pi / 2)

@@ -5,8 +5,7 @@ that they are the same under every reference condition. The foreshortening ½ p�
 frame, for just that is what the equations leave out, or know to second order where geometric stiffening is on.
 
 Estimates of errors, by the change S = Σ f_j K_j of the modes' stiffness under loads of sizes f_j, are those of
-docs/theory.md, Limits. Eigenvalues μ of K_ff^-½ S K_ff^-½ are the extreme relative changes of the stiffness of any
-shape; at −1 a shape has none left (Bathe, Finite Element Procedures, §6.8.2, linearized buckling).
+docs/theory.md, Limits. μ are eigenvalues of K_ff^-½ S K_ff^-½: −1 means buckling.
 """
 
 from collections.abc import Iterator, Mapping

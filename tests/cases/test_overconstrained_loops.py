@@ -100,6 +100,15 @@ def test_a_rigid_linkage_turns_over(integrator):
             np.testing.assert_allclose(other, one, atol=1e-5 * np.abs(one).max())
 
 
+def test_two_outputs_tell_no_turns():
+    """By the rates at both ends joint 4, at which the loop is cut, has turned once less than it has."""
+    tables = bennett(()) | {"trajectory": []}
+    tables["initial"] |= {"joint_rates": {"J1": 12.0}}
+    tables["analysis"] = [{"name": "free", "kind": "forward", "end": 1.5, "output_step": 1.5, "tolerance": 1e-6}]
+    with solved(tables) as run:
+        assert any('"J4": outputs are too far apart' in text for text in run.warnings["free"])
+
+
 def test_two_pins_hold_as_a_weld():
     """In the plane: a turning bar, to which another one is pinned at both ends, with a third at its end."""
     found = []
