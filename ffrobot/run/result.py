@@ -24,7 +24,7 @@ from ..mbs.quantities.supply import Energies, Momentum, actuator_forces, gear_mo
 from ..mbs.quantities.validity import Bending, deflection_warning, doubts
 from ..mbs.run.gears import unresolved_gears
 from ..mbs.run.record import Run
-from ..mbs.run.stops import path_warnings
+from ..mbs.run.stops import path_warnings, unseen_loads
 from ..mbs.scene.analysis import Analysis, IntegratedAnalysis, TimedAnalysis
 from .actuation import Actuation, find_actuation
 from .pieces import bending_of_links, links_in_pieces, make_whole_links
@@ -253,11 +253,13 @@ class AnalysisResult:
             texts.append(missed.in_words)
         return tuple(texts)
 
-    @property
+    @cached_property
     def notes(self) -> tuple[str, ...]:
         """Properties of correct results, a text each."""
         model = self.run.model
         texts: tuple[str, ...] = () if self.sharing is None else (self.sharing.in_words,)
+        if self._is_integrated:
+            texts += tuple(unseen_loads(model.scene.load, self.run.time[[0, -1]]))
         if self._is_integrated and model.scene.trajectory and not (of := self.analysis).follows_trajectories:
             texts += () if of.source else ("without actuation it does not follow the trajectories",)
         if self.run.is_prescribed and model.tree.loops and not model.motors:

@@ -15,6 +15,7 @@ from ...common.arrays import Array, Booleans
 from .._core import TimeFunction
 from ..posture.posture import misfits
 from ..scene.analysis import TimedAnalysis
+from ..scene.loads import Load
 from ..scene.trajectories import Trajectory
 
 
@@ -202,6 +203,15 @@ def _resolved(target: TimeFunction, times: Array, share: float = ENDS.resolved) 
 MISSED = 1.5  # times the largest rate at outputs: faster motion between them
 SLOWER = 1e-9  # relative
 STILL = 0.5  # of a run, in which way points are over: the other part is rest
+
+
+def unseen_loads(loads: Iterable[Load], ends: Array) -> Iterator[str]:
+    """Yield notes on `loads` of which nothing is seen from ends[0] to ends[1], s."""
+    times = _even(ends, ENDS.dense)
+    for number, load in enumerate(loads, 1):
+        for key, function in load.components.items():
+            if not function.sample(times)[0].any():
+                yield f"load no. {number}: {key} is 0 at all {len(times)} sampled times; it may have briefer pulses"
 
 
 def path_warnings(analysis: object, times: Array, paths: Iterable[Trajectory]) -> Iterator[str]:

@@ -160,13 +160,16 @@ def test_joints_beside_a_path_start_in_an_equilibrium_that_is_told(guess, angle,
     assert [told in text for text in found] == ([True] if told else [])
 
 
-def test_a_run_beside_the_trajectories_says_so():
-    """It starts at zero and stays there, whatever the path."""
+def test_a_run_says_what_does_not_move_it():
+    """It starts at zero and stays there, whatever the path, and a pulse that lasts 3e-8 s."""
     bar = {"mass": 1.0, "inertia": 0.1, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0], "tip": [0.5, 0.0]}}
     keys = {"trajectory": [{"name": "turn", "joint": "j", "value": "0.2 + t"}], "gravity": [0.0, 0.0]}
+    keys["load"] = [{"point": "a.tip", "y": "where(abs(t**2 - 1e-3) < 1e-9, 1e5, 0)"}]  # shorter than steps see
     free = {"name": "free", "kind": "forward", "end": 0.1, "output_step": 0.1}
     with ffrobot.solve(
         ffrobot.make_scene(**planar([{"name": "a", "rigid": bar}], [pin("j", "ground", "a.root")], free, **keys))
     ) as results:
-        assert results.notes == {"free": ["without actuation it does not follow the trajectories"]}
+        pulse, path = results.notes["free"]
+        assert pulse.startswith("load no. 1: y is 0 at all 16001 sampled times")
+        assert path == "without actuation it does not follow the trajectories"
         assert not results["free/joints/j/coordinate"].any()
