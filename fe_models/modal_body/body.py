@@ -151,6 +151,11 @@ class ModalBody(Integrals, Frozen):
         kind = "constraint" if self.reference_condition == "craig-bampton" else "attachment"
         return f"{self.eigenmode_count} modes" + (f" and {static} {kind} modes" if static else "")
 
+    @property
+    def middle(self) -> float:
+        """Place x, m, half way from root to tip."""
+        return float(self.interfaces["root"].position[0]) + self.length / 2
+
     def interpolate(self, x: float) -> Interface:
         """Mode shapes at the point `x` (m from the root) on the axis.
 
@@ -197,9 +202,9 @@ def _problems(body: ModalBody) -> Iterator[str]:
     if k < 2 or np.any(np.diff(body.stations.position[:, 0]) <= 0):
         yield "stations.position: expected at least two, ascending in x"
     first, last = body.stations.position[[0, -1], 0]
-    way = np.linalg.norm(body.interfaces["tip"].position - body.interfaces["root"].position)
+    way = (body.interfaces["tip"].position - body.interfaces["root"].position)[0]
     error = min(abs(body.length - last + first), abs(body.length - way))
-    if not error <= INTERFACE_TOLERANCE * body.length or not first <= body.length / 2 <= last:
+    if not error <= INTERFACE_TOLERANCE * body.length or not first <= body.middle <= last:
         yield f"length: expected {last - first:g} m, from first to last station, found {body.length} m"
     element = body.stations.element
     if element is not None and not _is_chain(element, k):

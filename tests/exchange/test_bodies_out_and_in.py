@@ -104,7 +104,7 @@ def mixed(body, T):
     """What `fem_text` asks for, in coordinates q, p = T q, which `ModalBody` does not take: a congruence with T."""
     at, names = body.stations, [item.name for item in dataclasses.fields(body)]
     return SimpleNamespace(**{name: getattr(body, name) for name in names} | {
-        "mode_count": body.mode_count, "interpolate": body.interpolate,
+        "mode_count": body.mode_count, "interpolate": body.interpolate, "middle": body.middle,
         "modal_mass": T.T @ T, "stiffness": T.T @ body.stiffness @ T,
         "S_bar": body.S_bar @ T, "I_bar": body.I_bar @ T,
         "S_bar_kl": np.einsum("abkl,km,ln->abmn", body.S_bar_kl, T, T),

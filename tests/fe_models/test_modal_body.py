@@ -74,6 +74,17 @@ def test_interpolation_reproduces_cubics(body, coefficients, element):
         np.testing.assert_allclose(found.rotation, rotation[0], atol=1e-12)
 
 
+def test_the_middle_lies_between_root_and_tip(body):
+    """Also where the origin is elsewhere, as in bodies of other programs."""
+    away = np.array([2.0, 0.0, 0.0])
+    stations = replace(body.stations, position=body.stations.position + away)
+    ends = {name: replace(at, position=at.position + away) for name, at in body.interfaces.items()}
+    moved = replace(body, stations=stations, interfaces=ends)
+    here, there = body.interpolate(0.7), moved.interpolate(moved.middle)
+    np.testing.assert_allclose(there.position, here.position + away, atol=1e-15)
+    np.testing.assert_allclose(there.translation, here.translation, rtol=1e-12)
+
+
 def test_hermite_interpolation_needs_no_smoothness_between_stations(body):
     """v and rotation are exact in each interval on its own, whatever the others do."""
     translation, rotation = body.stations.translation.copy(), body.stations.rotation.copy()
