@@ -11,8 +11,8 @@ import numpy as np
 from ffrobot.common.rotations import about, exponential, left_jacobian, logarithm, of_quaternion, quaternions, skew
 from ffrobot.mbs.model.body import bent_section
 
-STEP = 0.0015  # of the fastest coordinate, m, rad or √kg·m
-WEIGHTS = (4 / 5, -1 / 5, 4 / 105, -1 / 280)  # of central differences of order eight
+STEP = 0.005  # of the fastest coordinate, m, rad or √kg·m
+WEIGHTS = (6 / 7, -15 / 56, 5 / 63, -1 / 56, 1 / 385, -1 / 5544)  # of central differences of order twelve
 
 
 class Pose(NamedTuple):
