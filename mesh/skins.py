@@ -1,5 +1,6 @@
 """Meshes that only say what a body looks like (STL, OBJ, DAE …), by trimesh (extra "urdf")."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,15 +10,13 @@ from ..common.arrays import Array
 from ..common.errors import InputError, is_own_fault
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import trimesh
 
 READ = (".3mf", ".dae", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
 """Endings of files that are read: formats that trimesh reads itself, all of them without a program of others."""
 
 
-def loaded_skin(path: Path, scale: "Sequence[float]", d: Array, C: Array) -> "trimesh.Trimesh":
+def loaded_skin(path: Path, scale: Sequence[float], d: Array, C: Array) -> "trimesh.Trimesh":
     """Read the mesh in `path`, turned by C (3, 3) and moved by d (3,), m.
 
     Coordinates times `scale` (3,) are in m, or in the file's unit. Raises `ModuleNotFoundError` without trimesh,
@@ -43,7 +42,7 @@ def loaded_skin(path: Path, scale: "Sequence[float]", d: Array, C: Array) -> "tr
     return _moved(loaded, C @ np.diag(scale), d)
 
 
-def primitive_skin(shape: str, size: "Sequence[float]", d: Array, C: Array) -> "trimesh.Trimesh":
+def primitive_skin(shape: str, size: Sequence[float], d: Array, C: Array) -> "trimesh.Trimesh":
     """Box (x, y, z), cylinder along z (radius, length) or sphere (radius,), m, turned by C (3, 3), moved by d (3,)."""
     from trimesh import creation
 

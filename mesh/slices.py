@@ -10,19 +10,16 @@ Importing this loads dolfinx.
 
 from collections.abc import Iterator
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import basix
 import numpy as np
+from dolfinx.mesh import Mesh
 
 from ..common.arrays import Array, Booleans, Integers
 from ..common.errors import SolveError
 from ..common.structs import struct
 from .cells import HEXAHEDRON, KUHN, TETRAHEDRON
 from .compat import coordinate_element, geometry_nodes
-
-if TYPE_CHECKING:
-    from dolfinx.mesh import Mesh
 
 # Nodes closer to the plane than this, relative to the length of the part, lie in it.
 IN_PLANE = 1e-9
@@ -40,7 +37,7 @@ class SectionQuadrature:
     z_range: tuple[float, float]  # likewise
 
 
-def section_quadratures(mesh: "Mesh", x: Array, degree: int) -> Iterator[SectionQuadrature]:
+def section_quadratures(mesh: Mesh, x: Array, degree: int) -> Iterator[SectionQuadrature]:
     """Quadrature on each cross section at `x` (k,), m, exact for polynomials of `degree` in the coordinates.
 
     Where faces of cells lie in the plane, the section is that of the material towards larger x; at the end of the part
@@ -67,7 +64,7 @@ def _above(f: Array, at_end: bool, tolerance: float) -> Booleans:
     return f >= -tolerance if at_end else f > tolerance
 
 
-def _extent(mesh: "Mesh") -> tuple[float, float]:
+def _extent(mesh: Mesh) -> tuple[float, float]:
     x = mesh.geometry.x[:, 0]
     local = (x.min(), x.max()) if x.size else (np.inf, -np.inf)
     ranges = np.array(mesh.comm.allgather(local))
@@ -77,7 +74,7 @@ def _extent(mesh: "Mesh") -> tuple[float, float]:
 class _Cells:
     """The cells that a plane cuts: `index` (k,) local numbers, `nodes` (k, v, 3) and distances `f` (k, v) of nodes."""
 
-    def __init__(self, mesh: "Mesh", index: Integers, nodes: Array, f: Array) -> None:
+    def __init__(self, mesh: Mesh, index: Integers, nodes: Array, f: Array) -> None:
         self.index, self.nodes, self.f = index, nodes, f
         self.element = coordinate_element(mesh)
         self.tetrahedral = self.element.cell_type == basix.CellType.tetrahedron

@@ -5,11 +5,11 @@ The part is read or made, checked and its faces found on rank 0; dolfinx distrib
 
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import basix
 import numpy as np
-from dolfinx.mesh import exterior_facet_indices, meshtags
+from dolfinx.mesh import Mesh, exterior_facet_indices, meshtags
 from mpi4py import MPI
 
 from ..common.arrays import Array, Integers
@@ -19,9 +19,6 @@ from .compat import coordinate_element, create_solid_mesh, geometry_nodes
 from .part import Progress, kept_or_new
 from .part_mesh import PartMesh, facet_keys
 from .records import PartTables
-
-if TYPE_CHECKING:
-    from dolfinx.mesh import Mesh
 
 # A picture gets about so many triangles, where the mesh has fewer facets.
 TRIANGLES = 6000
@@ -42,7 +39,7 @@ class Surface:
     X: Array  # (k, 3) their reference coordinates in it
 
 
-def boundary(mesh: "Mesh") -> tuple[Integers, Integers, Integers]:
+def boundary(mesh: Mesh) -> tuple[Integers, Integers, Integers]:
     """Return the boundary facets (b,) of this process, ascending, their cells (b,) and local numbers in them (b,)."""
     mesh.topology.create_connectivity(2, 3)
     mesh.topology.create_connectivity(3, 2)
@@ -53,12 +50,12 @@ def boundary(mesh: "Mesh") -> tuple[Integers, Integers, Integers]:
     return facets, cells, np.argmax(of_cell == facets[:, None], axis=1)
 
 
-def reference_facets(mesh: "Mesh") -> Integers:
+def reference_facets(mesh: Mesh) -> Integers:
     """Return corners (m, 3 or 4) of each facet of the reference cell, in dolfinx's order."""
     return np.array(basix.topology(coordinate_element(mesh).cell_type)[2])
 
 
-def surface_of(mesh: "Mesh") -> Surface:
+def surface_of(mesh: Mesh) -> Surface:
     """Triangulate the boundary of `mesh`, with several triangles on a facet where it is coarse. Collective."""
     _, cells, which = boundary(mesh)
     count = mesh.comm.allreduce(len(cells))
@@ -79,7 +76,7 @@ def surface_of(mesh: "Mesh") -> Surface:
 
 
 def _positions(
-    mesh: "Mesh", element: basix.finite_element.FiniteElement, cells: Integers, X: Array
+    mesh: Mesh, element: basix.finite_element.FiniteElement, cells: Integers, X: Array
 ) -> tuple[Array, Array]:
     """(b, l, 3) positions of the reference points `X` (b, l, 3), and (b, 3) from each facet to its cell's middle."""
     if not cells.size:
@@ -112,7 +109,7 @@ def _lattice(corners: int, n: int) -> tuple[Array, Integers, Integers]:
     return weights, triangles, sides[count == 1]
 
 
-def _gathered(mesh: "Mesh", points: Array, triangles: Integers, edges: Integers, cells: Integers, X: Array) -> Surface:
+def _gathered(mesh: Mesh, points: Array, triangles: Integers, edges: Integers, cells: Integers, X: Array) -> Surface:
     """One numbering for the points of all processes; a point that several have belongs to the first of them."""
     comm = mesh.comm
     counts = comm.allgather(len(points))
@@ -140,7 +137,7 @@ MeshTags = Any  # dolfinx 0.5 and 0.9 name this class differently
 class SolidMesh:
     """Mesh of a solid part for its finite element model."""
 
-    mesh: "Mesh"  # of tetrahedra or hexahedra, distributed, without ghost cells; coordinates in m in the link's frame
+    mesh: Mesh  # of tetrahedra or hexahedra, distributed, without ghost cells; coordinates in m in the link's frame
     part: PartMesh  # names of regions and faces, and their tags; without points and cells
     cell_tags: MeshTags  # region of every local cell, one of `part.tags_of`; 0 of none
     facet_tags: MeshTags  # the facets of the named faces, all of them on the boundary: `part.faces`
@@ -185,7 +182,7 @@ def distributed(part: PartMesh | None) -> SolidMesh:
     return SolidMesh(mesh, known, *tags, size=size, surface=surface_of(mesh))
 
 
-def _tagged_facets(mesh: "Mesh", part: PartMesh, points: int) -> tuple[Integers, Integers]:
+def _tagged_facets(mesh: Mesh, part: PartMesh, points: int) -> tuple[Integers, Integers]:
     """Local facets that belong to a face, ascending, and their tags; `points`: number of those of the whole part."""
     facets, cells, which = boundary(mesh)
     nodes = np.take_along_axis(geometry_nodes(mesh)[cells], reference_facets(mesh)[which], axis=1)

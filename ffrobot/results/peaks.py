@@ -9,11 +9,11 @@ import numpy as np
 from ..common.arrays import Array, Indices
 from ..common.meanings import matches, meaning
 from ..common.peaks import largest, shares
+from ..mbs.joints.joint import JointRecord
 from ..mbs.quantities.motion import deflection, joint_motion, reported_points
 from ..mbs.quantities.supply import followed_trajectories, motor_moments, motor_motion, path_force
 
 if TYPE_CHECKING:  # reading can do without the core
-    from ..mbs.joints.joint import JointRecord
     from ..run.result import AnalysisResult
 
 POWER = "peak_power"
@@ -52,7 +52,7 @@ def peaking(result: "AnalysisResult") -> Iterator[tuple[str, Array]]:
         yield f"pzt/{name}/required_voltage", voltages.required
 
 
-def _of_joint(result: "AnalysisResult", joint: "JointRecord", place: str) -> Iterator[tuple[str, Array]]:
+def _of_joint(result: "AnalysisResult", joint: JointRecord, place: str) -> Iterator[tuple[str, Array]]:
     of, wants, is_single = result.histories, result.wants, len(joint.units) == 1
     run = of.run
     if wants(f"{place}/reaction"):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ..actuation.points import solve_points
+from ..actuation.points import PointForces, solve_points
 from ..common.arrays import Array, Indices
 from ..common.errors import InputError
 from ..common.structs import struct
@@ -32,7 +32,6 @@ from .prepared import Prepared
 from .stresses import find_stresses
 
 if TYPE_CHECKING:  # most scenes have none of these
-    from ..actuation.points import PointForces
     from .robustness import Deviations
 
 
@@ -96,7 +95,7 @@ class Histories:
         return find_stresses(self.run, prepared.parts or prepared.bodies, prepared.patches, prepared.divided)
 
     @cached_property
-    def point_forces(self) -> "Mapping[str, PointForces]":
+    def point_forces(self) -> Mapping[str, PointForces]:
         """Forces (N) at actuation points, by body."""
         return _point_forces(self.prepared, self.run)
 
@@ -150,7 +149,7 @@ class AnalysisResult:
         return totals(self.run)
 
     @cached_property
-    def point_forces(self) -> "Mapping[str, PointForces]":
+    def point_forces(self) -> Mapping[str, PointForces]:
         """Forces (N) at actuation points at outputs, by body."""
         of = self.histories
         return of.point_forces if of.run is self.run else _point_forces(self.prepared, self.run)
@@ -272,7 +271,7 @@ class AnalysisResult:
         return max((link.stiffness_change for link in self.bending.values()), default=0.0)
 
 
-def _point_forces(prepared: Prepared, run: Run) -> "dict[str, PointForces]":
+def _point_forces(prepared: Prepared, run: Run) -> dict[str, PointForces]:
     if run.analysis.allocates_patches and any(row.is_trajectory for row in run.model.rows):
         return {name: solve_points(points, run) for name, points in prepared.points.items()}
     return {}

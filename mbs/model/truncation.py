@@ -6,16 +6,13 @@ critique of mode acceleration and modal truncation augmentation methods, Comput.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...common.arrays import Array
+from ..scene.mechanism import MechanismKeys
 from .body import Body, Reduction, transformed
 from .masses import coupled_blocks
-
-if TYPE_CHECKING:
-    from ..scene.mechanism import MechanismKeys
 
 IMMOBILE = 1e-9  # of the ordinary size of modes, 1/√m: less is round-off
 DEPENDENT = 1e-8  # of the first static shape, in energy: smaller ones are dependent
@@ -63,7 +60,7 @@ def modes_kept(body: Body) -> str:
     return f"{lowest} of {body.reduction.whole.n_eigenmodes} modes{shapes}"
 
 
-def loaded_points(scene: "MechanismKeys", body: str) -> list[str]:
+def loaded_points(scene: MechanismKeys, body: str) -> list[str]:
     """Return names of points of a body at which joints, trajectories and loads of the scene act."""
     loaded = [reference.body_and_point for reference in scene.references() if reference.loaded]
     return list(dict.fromkeys(part[1] for part in loaded if part is not None and part[0] == body))
