@@ -11,6 +11,7 @@ import numpy as np
 
 from ..common.arrays import Array
 from ..common.errors import FfrobotError, InputError, SolveError, check_known, quoted
+from ..common.structs import struct
 from ..fe_models.link_source import LinkTable, link_keys, link_path
 from ..mbs.scene.analysis import TIGHTEST_TOLERANCE, Analysis, IntegratedAnalysis
 from ..results.file import Results
@@ -78,7 +79,7 @@ def relative(values: Array, reference: Array) -> float:
 COUNTS = ("steps", "rejected", "evaluations")
 
 
-@dataclass(frozen=True)
+@struct
 class TimedRun:
     """One solve: how it ended, its cost, and its histories, which are empty unless it completed."""
 
@@ -176,7 +177,7 @@ HOPELESS = 100.0  # times as long as the best at the same tolerance
 Row = dict[str, object]
 
 
-@dataclass(frozen=True)
+@struct
 class Settings:
     """Repetitions of a run, its time limit `budget` (s), names of integrators, tolerances."""
 
@@ -195,7 +196,7 @@ class Settings:
                 )
 
 
-@dataclass(frozen=True)
+@struct
 class ReferenceRun:
     """The run against which errors are measured, and an `other` one, whose difference from it is its `error`.
 

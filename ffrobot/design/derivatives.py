@@ -5,13 +5,14 @@ h, h/2 and h/4 to both sides Richardson's extrapolation, of order h⁶.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import combinations
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from ..common.arrays import Array
+from ..common.structs import struct
 from ..sweep.sweep import Key
 from .designs import Point, moved
 from .readings import Reading, Response
@@ -72,7 +73,7 @@ RESOLVING = 8.0  # least ratio of errors between outputs: with every second outp
 ROUGH = 1e-2  # of a derivative: beyond, the response is hardly smooth
 
 
-@dataclass(frozen=True)
+@struct
 class Base:
     """Point of differentiation: k `keys` with their values `point`, and g `responses` with their `readings`.
 
@@ -93,7 +94,7 @@ class Base:
         return moved(self.point, k, self.point[k] + offset)
 
 
-@dataclass(frozen=True)
+@struct
 class Sample:
     """A run with key number `k` changed by `offset`: its responses, or none and the message of its `failure`."""
 
@@ -107,7 +108,7 @@ Method = Literal["differences", "repeated steps", "one-sided", "none"]
 """Method of a derivative; "repeated steps": differences of runs with the same time steps."""
 
 
-@dataclass(frozen=True)
+@struct
 class Entry:
     """∂response/∂key with its estimated error, both in SI units, NaN where there is none.
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from math import ceil
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,6 +17,7 @@ from ..common.files import AnyPath, check_folder
 from ..common.outputs import protected
 from ..common.parallel import processes as of_mpi
 from ..common.python_files import allowed_python, python_allowed
+from ..common.structs import struct
 from ..common.tables import DEEPEST
 from ..mbs.fields.field_types import DATASET
 from ..mbs.scene.analysis import IntegratedAnalysis, TimedAnalysis
@@ -98,7 +99,7 @@ def in_words(keys: Iterable[Key], point: Point) -> str:
     return ", ".join(f"{'.'.join(key)} = {number(value)}" for key, value in zip(keys, point, strict=True))
 
 
-@dataclass(frozen=True)
+@struct
 class Runs:
     """Settings of the runs of designs: scene file, folder (`kept` or temporary), the batch that performs them.
 
@@ -142,7 +143,7 @@ def runs_of(
         yield Runs(path, Path(folder), batch, output is not None, retry, watcher or Watcher())
 
 
-@dataclass(frozen=True)
+@struct
 class Design:
     """One run: its row in the table, the folder of its results, and the names `asked` of datasets read so far."""
 

@@ -14,7 +14,7 @@ correct later one-sided ones. Derivatives of peaks are those at their own time (
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from scipy.optimize import nnls
 from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.files import write_atomically
+from ..common.structs import struct
 from ..common.tables import as_csv
 from ..sweep.sweep import Key
 from .derivatives import weights
@@ -33,7 +34,7 @@ from .responses import KEPT, DesignProblem
 from .variables import DesignSpace, Place
 
 
-@dataclass(frozen=True)
+@struct
 class Evaluated:
     """Design at one place of the unit cube: `readings` of all responses, or none and the message of its `failure`.
 
@@ -137,7 +138,7 @@ ROUND_OFF = 1e-11  # of responses: differs between runs with the same steps
 DOUBTFUL = 1e-2  # of differences: what the run with all of them may leave
 
 
-@dataclass(frozen=True)
+@struct
 class Slopes:
     """Gradients at one design: `gradient` (r, n), SI units, of r responses by n unit-cube coordinates; `error` alike.
 
@@ -253,7 +254,7 @@ ACTIVE = 1e-4  # of a limit, or of a number's range: nearer ones count as reache
 CLOSED = 1e-2  # of the gradient at an optimum: largest `gap` there
 
 
-@dataclass(frozen=True)
+@struct
 class Optimality:
     """Conditions of optimality (Karush, Kuhn, Tucker) at one design, in the scaled problem."""
 

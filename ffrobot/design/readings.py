@@ -5,7 +5,6 @@ as long as no other peak exceeds it. The time is that of the top itself, between
 """
 
 import re
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy as np
 from ..common.arrays import Array
 from ..common.errors import InputError, did_you_mean
 from ..common.peaks import root_mean_square, top_at
+from ..common.structs import struct
 from ..results.file import Results, dataset_and_column
 from ..results.joints import unit_of
 from ..results.peaks import MEAN_POWER, RMS_POWER
@@ -20,7 +20,7 @@ from ..results.peaks import POWER as PEAK_POWER
 from ..sweep.runs import by_dots, is_vector
 
 
-@dataclass(frozen=True)
+@struct
 class Reading:
     """Value of a response in some results; of a peak also its time and column."""
 
@@ -96,7 +96,7 @@ UNCERTAIN = "uncertain, as outputs, which alone count here, miss a part of the h
 SUPPORT = 6  # outputs that a value between outputs is made from
 
 
-@dataclass(frozen=True)
+@struct
 class History:
     """A dataset over T outputs: `values` (T, columns) in `unit` at `time` (T,), s; of vectors the length, one column.
 
@@ -201,7 +201,7 @@ COARSE = 2  # every second output: peaks by these show how well all resolve them
 NOISE = 1e-6  # of a peak: a valley that is less deep lies between no two peaks
 
 
-@dataclass(frozen=True)
+@struct
 class Peak(Response):
     """The largest absolute value of a history, of any of its columns; of vectors their length."""
 

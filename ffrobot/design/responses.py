@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -12,6 +12,7 @@ from ..actuation.motor_catalog import CatalogMotor, choice_of
 from ..common.arrays import Array
 from ..common.errors import InputError, check_known, either, quoted
 from ..common.peaks import root_mean_square, shares
+from ..common.structs import struct
 from ..common.tables import shown
 from ..fe_models.modal_body import ModalBody
 from ..present.feasibility import joint_tasks
@@ -21,7 +22,7 @@ from .readings import MISSED, POWER, UNCERTAIN, History, Peak, Reading, Response
 from .variables import DesignSpace, DesignVariable
 
 
-@dataclass(frozen=True)
+@struct
 class OfMotors(Response):
     """Response of motors that the variables `chosen` select: total "mass" (kg) or "cost", or the largest "share".
 
@@ -59,7 +60,7 @@ class OfMotors(Response):
 ROUND_OFF = 1e-9  # of a history: by so much means of nothing may differ
 
 
-@dataclass(frozen=True)
+@struct
 class OfHistory(Response):
     """The "rms", "mean" or "integral" of a history of one column, or its value "at" t, s."""
 
@@ -96,7 +97,7 @@ class OfHistory(Response):
         return mean * float(np.ptp(time)) if self.word == "integral" else mean
 
 
-@dataclass(frozen=True)
+@struct
 class OfSettling(Response):
     """The "residual" vibration of a point, m, or its "settling" time, s; see `mbs.quantities.settling`."""
 
@@ -121,7 +122,7 @@ class OfSettling(Response):
         return Reading(rest, "s", doubt="not settled at the end of the run: at least that, take a later end")
 
 
-@dataclass(frozen=True)
+@struct
 class OfFrequency(Response):
     """Natural frequency of a link, Hz; `number` counts eigenmodes from 1 in the order of the modal body."""
 
@@ -153,7 +154,7 @@ class OfFrequency(Response):
         return results.modal_body(self.body)
 
 
-@dataclass(frozen=True)
+@struct
 class OfMass(Response):
     """Mass of one body, or of all bodies, kg, without payloads and patches."""
 
@@ -175,7 +176,7 @@ class OfMass(Response):
         return Reading(mass, "kg")
 
 
-@dataclass(frozen=True)
+@struct
 class OfValue(Response):
     """A number of the scene file itself, such as the duration of a path; not of link files."""
 
@@ -226,7 +227,7 @@ LINEAR = 0.1  # ratio to a response's size: logarithms above, tangent below, as 
 KEPT = 1e-6  # of a limit: what is beyond it by no more keeps it
 
 
-@dataclass(frozen=True)
+@struct
 class Limit:
     """Limit of a response: `sense` · (response − bound) ≤ 0; `sense` is 1 of "<=" and −1 of ">="."""
 
@@ -249,7 +250,7 @@ class Limit:
         return self.sense * (value - self.bound) / self.scale
 
 
-@dataclass(frozen=True)
+@struct
 class DesignProblem:
     """Optimization problem: minimize (`sense` 1) or maximize (−1) the objective within m `limits`.
 

@@ -7,7 +7,6 @@ Technometrics 29, 1987).
 import math
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -17,6 +16,7 @@ from scipy.special import ndtri
 from ..common.arrays import Array
 from ..common.errors import InputError
 from ..common.libraries import scipy
+from ..common.structs import struct
 from ..common.tables import shown
 from ..sweep.files import number_at
 from ..sweep.sweep import Key
@@ -27,7 +27,7 @@ NAMES = tuple(f"{100 * level:g}%" for level in LEVELS)
 RESAMPLES = 200  # of a bootstrap
 
 
-@dataclass(frozen=True)
+@struct
 class SpreadStatistics:
     """Statistics of quantities (…) in their units: `mean` (…), `deviation` (…), `quantiles` (3, …): 5, 50, 95 %.
 
@@ -101,7 +101,7 @@ def regression_shares(inputs: Array, outputs: Array) -> tuple[Array, Array]:
     return coefficients.T**2, explained
 
 
-@dataclass(frozen=True)
+@struct
 class Indices:
     """Sobol indices (g, k), no unit, of g responses by k keys: `first` order (a key alone), `total` (interactions too).
 
@@ -147,7 +147,7 @@ def _indices(a: Array, b: Array, ab: Array) -> tuple[Array, Array]:
 WIDE = 2.0  # standard deviations of a normal key within which scenes have to be valid
 
 
-@dataclass(frozen=True)
+@struct
 class Spread:
     """Distribution of one key: uniform within `half` of `mean`, or normal with the standard deviation `deviation`.
 

@@ -7,7 +7,6 @@ of a catalog is the number of the row, from 0.
 import re
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ import numpy as np
 from ..actuation.motor_catalog import CatalogMotor, read_catalog
 from ..common.errors import InputError
 from ..common.keys import MOST_RUNS
+from ..common.structs import struct
 from ..common.tables import shown
 from ..sweep.files import number_at, value_at
 from ..sweep.sweep import Key, check_once
@@ -32,7 +32,7 @@ FORMS = (
 )
 
 
-@dataclass(frozen=True)
+@struct
 class DesignVariable:
     """A number x between `low` and `high` that all `keys` take, or one of the `rows` with a value for each key.
 
@@ -93,7 +93,7 @@ class DesignVariable:
         return float(relative * np.clip(abs(self.values(u)[0]), 1e-3 * span, span) / self.slope(u))
 
 
-@dataclass(frozen=True)
+@struct
 class DesignSpace:
     """All design `variables`; `own`: the scene's values at their keys, in order."""
 

@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from threading import local
@@ -21,6 +21,7 @@ from ..common.errors import InputError, SolveError, check_known, did_you_mean, q
 from ..common.files import check_folder, write_atomically
 from ..common.keys import MOST_RUNS
 from ..common.python_files import allowed_python, python_allowed
+from ..common.structs import struct
 from ..common.tables import shown
 from ..mbs.fields.field_types import Quantity
 from ..mbs.linear.linearisation import labelled
@@ -92,7 +93,7 @@ OUT_OF_REACH, OUTSIDE_LIMITS, NO_EQUILIBRIUM = 1, 2, 3
 STATUS = ("found", "out of reach", "outside joint limits", "no equilibrium")
 
 
-@dataclass(frozen=True)
+@struct
 class MapPlan:
     """Settings of a map of a scene over the grid of `axes`, with its folder."""
 
@@ -118,7 +119,7 @@ class MapPlan:
         return np.array(self.milling.axis) / np.linalg.norm(self.milling.axis)
 
 
-@dataclass(frozen=True)
+@struct
 class PoseMap:
     """A map of P poses: `values` (P, …) by name, in units of `map_file.UNITS`, NaN without a pose or a limit.
 
@@ -236,7 +237,7 @@ def _judged(
 _evaluators = local()  # which serves one thread
 
 
-@dataclass(frozen=True)
+@struct
 class _PosesOf:
     """Job data: plan of a map, folders with allowed Python files, some posture q (n_q,); `key`: text of all inputs."""
 

@@ -3,7 +3,6 @@
 import tomllib
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -13,6 +12,7 @@ import tomli_w
 from ..common.errors import InputError, did_you_mean, quoted
 from ..common.files import write_atomically
 from ..common.keys import MOST_RUNS, check_name
+from ..common.structs import struct
 from ..common.tables import DEEPEST, shown
 from ..common.toml_files import load_toml
 from ..run.inputs import FILE_KEYS, digest_of_file, fingerprints, named_files
@@ -21,7 +21,7 @@ Value: TypeAlias = Any
 """What TOML may hold: a number, a text, a list …"""
 
 
-@dataclass(frozen=True)
+@struct
 class Variation:
     """Varied key of the scene or a link file (`links.BODY.…`), or several varied together, and its values."""
 
@@ -93,7 +93,7 @@ Node = dict[str, Any] | list[Any]
 LINKS, SCENE = "links", "scene.toml"
 
 
-@dataclass(frozen=True)
+@struct
 class RunFiles:
     """Content of the scene file of one run and of its changed link files."""
 

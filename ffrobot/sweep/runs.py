@@ -5,7 +5,7 @@ import os
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from ..common.errors import InputError, did_you_mean
 from ..common.locks import is_running, this_process
 from ..common.meanings import meaning
 from ..common.peaks import root_mean_square
+from ..common.structs import struct
 from ..results.file import Results
 from ..run.inputs import changed, digest_of_file
 from .files import SCENE
@@ -47,7 +48,7 @@ OF_MODES = {"linear", "joints_locked", "joints_compliant"}
 """Groups with datasets `PER_MODE` whose columns are the robot's vibrations, the lowest first, no vector."""
 
 
-@dataclass(frozen=True)
+@struct
 class SweepRun:
     """Run of one combination of `values`: its number in the table and its `folder`.
 
@@ -64,7 +65,7 @@ class SweepRun:
     wanted: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
+@struct
 class Row:
     """Row of a run: `status` "completed", "wrong input", "failed" or "crashed", with the program's message.
 

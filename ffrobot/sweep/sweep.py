@@ -6,7 +6,7 @@ import os
 import signal
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, field, replace
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -20,6 +20,7 @@ from ..common.files import check_folder, write_atomically
 from ..common.keys import MOST_RUNS
 from ..common.libraries import scipy
 from ..common.python_files import allowed_python, python_allowed
+from ..common.structs import struct
 from ..common.tables import as_csv
 from ..common.version import digest_of_content
 from ..present.lines import plain_table
@@ -35,7 +36,7 @@ Key = tuple[str, ...]
 """Parts of a key, `("payload", "0", "mass")`."""
 
 
-@dataclass(frozen=True)
+@struct
 class Sweep:
     """The runs of a scene: `points` are the combinations of the `variations`' values, one run each.
 
