@@ -168,15 +168,14 @@ def with_paths(
     if shapers:
         paths = [path for one in scene.trajectory if (path := one.path) is not None]
         begin, end = min(path.begin for path in paths), max(path.end for path in paths)
-        frequencies = frequencies_along(model, begin, end, max(shaper.modes for shaper in shapers.values()))
+        frequencies, ratios = frequencies_along(model, begin, end, max(shaper.modes for shaper in shapers.values()))
         for name, shaper in shapers.items():  # for the mean frequencies and damping along the path
-            f, ratio = frequencies.frequency[:, : shaper.modes], shaper.damping_ratio
+            f, ratio = frequencies[:, : shaper.modes], shaper.damping_ratio
             ranges = (f"{one.mean():.4g} Hz ({one.min():.4g} to {one.max():.4g} along the path)" for one in f.T)
             notes.append(f"{name}: {shaper.kind} shaper for {', '.join(ranges)}")
             if ratio is None:
-                ratio = tuple(frequencies.damping_ratio[:, : shaper.modes].mean(axis=0).tolist())
-            frequency = tuple(f.mean(axis=0).tolist())
-            shapers[name] = Shaper(kind=shaper.kind, frequency=frequency, damping_ratio=ratio)
+                ratio = tuple(ratios[:, : shaper.modes].mean(axis=0))
+            shapers[name] = Shaper(kind=shaper.kind, frequency=tuple(f.mean(axis=0)), damping_ratio=ratio)
         changed = [one.changed(shaper=shapers[one.name]) if one.name in shapers else one for one in scene.trajectory]
         scene = scene.model_copy(update={"trajectory": tuple(changed)})
     if any(trajectory.fastest for trajectory in scene.trajectory):

@@ -9,7 +9,6 @@ import numpy as np
 
 from ...common.arrays import Array, null_space
 from ...common.errors import InputError, quoted
-from ...common.structs import struct
 from ..model.gears import friction_damping, gear_matrices, with_prescribed_motors
 from ..model.known_motion import State, mass_matrices
 from ..model.model import Model
@@ -70,19 +69,12 @@ def elastic_shapes(M: Array, K: Array, C_v: Array) -> tuple[Array, Array]:
 INSTANTS = 9
 
 
-@struct
-class PathFrequencies:
-    """The lowest vibrations of the undeformed robot at instants of a path: Hz and damping ratios, (instants, modes)."""
-
-    frequency: Array
-    damping_ratio: Array
-
-
-def frequencies_along(model: Model, begin: float, end: float, modes: int) -> PathFrequencies:
+def frequencies_along(model: Model, begin: float, end: float, modes: int) -> tuple[Array, Array]:
     """The `modes` lowest vibrations of the undeformed robot on its trajectories, from `begin` to `end`, s.
 
-    Where motors follow these, compliant gears are among the springs. Joints that the paths leave free are free.
-    Raises `InputError` where the path is out of reach, or there are fewer vibrations.
+    Frequencies, Hz, and damping ratios, (instants, modes) each. Where motors follow the trajectories, compliant gears
+    are among the springs. Joints that the paths leave free are free. Raises `InputError` where the path is out of
+    reach, or there are fewer vibrations.
     """
     model = with_prescribed_motors(resolved(model, end))
     state, system, spectra = undeformed_posture(model), MultibodySystem(model), []
@@ -104,8 +96,8 @@ def frequencies_along(model: Model, begin: float, end: float, modes: int) -> Pat
             " constrained path",
             modes,
         )
-    frequency = np.array([omega[:modes] for omega, _ in spectra]) / (2 * np.pi)
-    return PathFrequencies(frequency, np.array([ratio[:modes] for _, ratio in spectra]))
+    omegas, ratios = np.array([(omega[:modes], ratio[:modes]) for omega, ratio in spectra]).swapaxes(0, 1)
+    return omegas / (2 * np.pi), ratios
 
 
 def with_robot_damping(model: Model, ratios: Mapping[str, float]) -> Model:
