@@ -185,8 +185,7 @@ def _voltages(shape: Array, Phi_V: Array, F_p: Array) -> Array:
     forces, largest = shape @ F_p.T, []
     for some in in_parts(Phi_V.shape[1], CHUNK):
         chunk = np.einsum("mn,nsk->smk", shape, Phi_V[:, some])
-        sizes = np.linalg.svd(chunk, compute_uv=False)
-        reachable = sizes[:, -1] > sizes[:, 0] / SINGULAR
+        reachable = np.linalg.cond(chunk) < SINGULAR
         worst = np.full(len(chunk), np.inf)
         worst[reachable] = np.abs(np.linalg.pinv(chunk[reachable]) @ forces).max(axis=(1, 2), initial=0.0)
         largest.append(worst)
