@@ -2,6 +2,7 @@
 
 import tomllib
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from copy import deepcopy
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -72,13 +73,11 @@ def parse_variation(text: str) -> Variation:
 
 
 def _range(keys: tuple[tuple[str, ...], ...], pieces: Sequence[str], text: str) -> Variation:
-    logarithmic = len(pieces) == 4
-    try:
+    logarithmic, count = len(pieces) == 4, 0
+    with suppress(ValueError):
         first, last, count = float(pieces[0]), float(pieces[1]), int(pieces[2])
-    except ValueError:
-        raise InputError("--vary: expected two numbers and a count, FIRST:LAST:COUNT", text) from None
     if count < 1 or not np.isfinite([first, last]).all() or (logarithmic and pieces[3] != "log"):
-        raise InputError("--vary: expected FIRST:LAST:COUNT with a count of at least 1, or …:log", text)
+        raise InputError("--vary: expected FIRST:LAST:COUNT with two numbers and a count of at least 1, or …:log", text)
     if count > MOST_RUNS:
         raise InputError(f"--vary: expected at most {MOST_RUNS} values", text)
     if logarithmic and not np.sign(first) * np.sign(last) > 0:

@@ -16,7 +16,7 @@ from rich.console import Console
 
 from ..batch.batch import Batch
 from ..common.errors import FfrobotWarning, InputError, StoppedError
-from ..common.files import check_folder, write_atomically
+from ..common.files import check_folder, check_new_folder, write_atomically
 from ..common.keys import MOST_RUNS
 from ..common.libraries import scipy
 from ..common.python_files import allowed_python, python_allowed
@@ -234,8 +234,8 @@ def claim_folder(sweep: Sweep) -> None:
     path = sweep.folder / PLAN
     if path.exists() and path.read_text(encoding="utf-8", errors="replace") != plan:
         raise InputError(f"{sweep.folder}: output: expected a new folder or one of this very sweep", "another's")
-    if not path.exists() and sweep.folder.exists() and any(sweep.folder.iterdir()):
-        raise InputError(f"{sweep.folder}: output: expected a new folder", "one that holds other files")
+    if not path.exists():
+        check_new_folder(sweep.folder)
     write_atomically(path, plan.encode(), "plan of the sweep", make_folder=True, ours=True)
 
 

@@ -97,7 +97,7 @@ def test_latin_hypercube(ffrobot, short_scene):
     [
         ("gravity", "--vary: expected KEY=VALUES"),
         ("gravity.1=", "--vary: expected FIRST:LAST:COUNT"),
-        ("gravity.1=1:2:x", "--vary: expected two numbers and a count"),
+        ("gravity.1=1:2:x", "--vary: expected FIRST:LAST:COUNT with two numbers and a count"),
         ("gravity.1=-1:1:3:log", "two ends of one sign"),
         ("gravity.7=1,2", '--vary: expected one of "0", "1" in "gravity.7", found "7"'),
         ("body.cranck.rigid.mass=1,2", 'did you mean "crank"?'),
