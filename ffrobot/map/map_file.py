@@ -19,27 +19,17 @@ from .pose_map import STATUS, PoseMap
 
 FORMAT, FORMAT_VERSION = "ffrobot-map", 1
 TABLE, FILE = "table.csv", "map.h5"
+METRES = ("sag", "place", "robot", "milling_depth", "milling_best_depth", "milling_lobes", "milling_deviation")
 UNITS = {
     "frequency": "Hz",
     "compliance": "m/N, rad/N, m/(N·m), rad/(N·m)",
     "stiffness": "N/m",
     "least_stiffness": "N/m",
-    "direction": "",
     "response": "m/N",
-    "sag": "m",
     "torque": "N·m or N",
-    "torque_share": "",
-    "place": "m",
-    "manipulability": "",
-    "robot": "m",
-    "milling_depth": "m",
-    "milling_best_depth": "m",
-    "milling_feed": "",
-    "milling_lobes": "m",
-    "milling_deviation": "m",
     "best_turn": "rad",
     "best_turn_depth": "m",
-}
+} | dict.fromkeys(METRES, "m")
 NOT_IN_TABLE = ("compliance", "response", "robot", "milling_lobes")
 
 

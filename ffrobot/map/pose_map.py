@@ -18,7 +18,7 @@ from pydantic import TypeAdapter
 from ..batch.batch import Batch
 from ..common.arrays import Array, Booleans, Indices
 from ..common.errors import InputError, SolveError, check_known, did_you_mean, quoted
-from ..common.files import check_folder, write_atomically
+from ..common.files import check_folder, check_new_folder, write_atomically
 from ..common.keys import MOST_RUNS
 from ..common.python_files import allowed_python, python_allowed
 from ..common.structs import struct
@@ -306,14 +306,12 @@ def _kept_postures(plan: MapPlan, request: Mapping[str, Any]) -> Postures | None
     before: dict[str, Any] = {}
     with suppress(OSError, ValueError):
         before = json.loads((plan.folder / PLAN).read_text(encoding="utf-8"))
-    if not before and plan.folder.exists() and any(plan.folder.iterdir()):
-        raise InputError(f"{plan.folder}: output: expected a new folder or one of a map", "one with other files")
+    if not before:
+        check_new_folder(plan.folder)
     if before.get("asked") != request["asked"] or changed(before.get("inputs", {}), request["inputs"]):
         return None
-    stored = _read(plan.folder / POSTURES) or {}
-    if stored.keys() != set(Postures._fields):
-        return None
-    return Postures(stored["q"], stored["reached"].astype(bool), stored["within"].astype(bool))
+    stored: dict[str, Any] = _read(plan.folder / POSTURES) or {}
+    return Postures(**stored) if stored.keys() == set(Postures._fields) else None
 
 
 def _assembled(

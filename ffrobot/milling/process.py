@@ -127,17 +127,13 @@ def stable_depths(milling: Milling, free: FreeCoordinates, J: Array, axes: Array
     least = float(depths.min())
     found = {"milling_depth": least, "milling_best_depth": depths.max(), "milling_feed": feeds[depths.argmax(), 0]}
     if milling.speeds:
-        found["milling_lobes"] = _lobes(milling, limits, tip._replace(J=feeds[depths.argmin()] @ tip.J), least)
+        speed, worst = np.array(milling.speeds) * 2 * np.pi / 60, tip._replace(J=feeds[depths.argmin()] @ tip.J)
+        found["milling_lobes"] = (
+            np.min([one.lobes(milling.teeth, speed) for one in limits], axis=0)
+            if milling.method == "averaged" or not np.isfinite(least)
+            else [limit_depth(worst, milling, float(each), (least / 10, least * 1000)) for each in speed]
+        )
     return {name: np.asarray(value, dtype=float) for name, value in found.items()}
-
-
-def _lobes(milling: Milling, limits: "Sequence[StabilityLimits]", worst: "Tip", least: float) -> Array:
-    """Stable depths (S,), m, at the speeds, by the `limits` of all feeds, or of the tip in the `worst` one."""
-    speed = np.array(milling.speeds) * 2 * np.pi / 60
-    if milling.method == "averaged" or not np.isfinite(least):
-        return np.min([one.lobes(milling.teeth, speed) for one in limits], axis=0)
-    bounds = least / 10, least * 1000  # the depth without lobes
-    return np.array([limit_depth(worst, milling, float(each), bounds) for each in speed])
 
 
 NEAREST, FARTHEST = 0.03, 10.0  # limits of distances from a mode: of half-bandwidths, and of its frequency

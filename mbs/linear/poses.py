@@ -65,8 +65,7 @@ class PoseEvaluator:
         direct = [name for name in self._linear.names if name in driven]
         if len(direct) < len(driven):
             raise InputError(
-                f"{model.scene.path}: joint: expected no more motors than the mechanism has degrees of freedom",
-                f"{len(driven)} ({quoted(model.motors)})",
+                f"{model.scene.path}: joint: expected no more motors than degrees of freedom", quoted(model.motors)
             )
         geared = [name.replace("motor/", "joint/") for name in shafts]
         self.motors = (*(name for name in direct if name not in geared), *shafts)

@@ -203,7 +203,7 @@ def test_a_wrong_point_and_a_folder_of_something_else(arm, tmp_path):
         mapped(arm, tmp_path / "map", "elbow=0:1:3", point="fore.tp")
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "letter.txt").write_text("mine")
-    with pytest.raises(InputError, match="expected a new folder or one of a map"):
+    with pytest.raises(InputError, match="expected a new or empty folder"):
         mapped(arm, tmp_path / "other", "elbow=0:1:3")
 
 
@@ -283,7 +283,7 @@ def test_manipulability_of_a_loop_behind_gears(tmp_path, order):
     u = found.values["place"][0] - ends
     speeds = [u[k] @ [-ends[k, 1], ends[k, 0] - 0.4 * k] for k in (0, 1)]
     assert found.values["manipulability"][0] == pytest.approx(abs(np.prod(speeds) / np.linalg.det(u)), rel=1e-9)
-    with pytest.raises(InputError, match=r'no more motors than .* degrees of freedom, found 3 \("\w", "\w", "\w"\)'):
+    with pytest.raises(InputError, match=r"no more motors than degrees of freedom, found"):
         mapped(written(tmp_path, five_bar(order, third=True)), tmp_path / "none", "A=2.0", "C=1.2", point="b.tip")
 
 
