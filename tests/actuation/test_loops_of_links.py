@@ -66,6 +66,15 @@ def test_a_beam_that_is_welded_needs_no_trajectory(space, inverse):
     assert decay(solution, "loop") == pytest.approx(0.05, rel=0.05)
 
 
+def test_voltages_alone_hold_a_welded_beam_straight():
+    """Against its weight, which would bend its tip by 5 mm within this time."""
+    straight = {"name": "inverse", "kind": "fcid", "shape": "zero", "end": 0.05, "output_step": 0.01}
+    replay = {"name": "replay", "kind": "forward", "actuation": "inverse", "apply": "joints+pzt"}
+    keys = {"gravity": [0.0, -9.81], "pzt": [PATCHES]}
+    run = solve_scene(one_link("link", paper_link(count=3), straight, replay, **keys)).outcomes["replay"]
+    assert np.abs(run.q).max() < 1e-12
+
+
 def test_all_integrators_go_from_sample_to_sample_alike():
     """Loads jump at every sample: methods that look back must not look across."""
     control = DAMPER | {"sensor": "ideal"}
