@@ -209,13 +209,9 @@ def largest_moments(model: Model, *, limits: bool) -> Array:
 
 
 def _check_motors(model: Model, analysis: Forward, q: Array) -> None:
-    """Raise `InputError` without motors, and in the plane where their moments were not computed at q (n_q,)."""
+    """Raise `InputError` where motors are missing at q (n_q,), or in the plane do not fit the mechanism."""
     count, freedom = len(model.motor_columns), mobility(model, q).freedom
-    if not count and (freedom or analysis.apply == "joints"):
-        raise InputError(
-            f'apply: expected joints with motors for "{analysis.apply}"', "none: name them with motor = true"
-        )
-    if model.scene.is_planar and count != freedom:
+    if (model.scene.is_planar or not count) and count != freedom:
         raise InputError(
             f'apply: expected motors that fit the mechanism ({freedom} of them) for "{analysis.apply}"',
             f'{count}; name them with motor = true, or use apply = "trajectory"',
