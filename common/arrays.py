@@ -16,7 +16,7 @@ PPoly = Any  # scipy.interpolate.PPoly, of which type checkers know nothing, and
 
 
 def in_parts(count: int, size: int) -> list[slice]:
-    """Slices of `size` numbers each, the last of what is left, of `count` in all."""
+    """Slices of `count` numbers, of `size` each and the last of what is left."""
     return [slice(k, k + size) for k in range(0, count, size)]
 
 

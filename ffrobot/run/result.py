@@ -171,7 +171,10 @@ class AnalysisResult:
         metrics = getattr(run.details, "metrics", None)
         lowest = rest.frequency if metrics is None else metrics.lowest_frequency
         points = list(end_points(self.prepared.scene, reported_points(run)))
-        return settling(replace(run.closer, links=run.links), rest, points, analysis.settled, lowest)
+        seen = self.histories.run
+        if seen is run:  # gears may be known at outputs alone
+            seen = replace(run.closer, links=run.links)
+        return settling(seen, rest, points, analysis.settled, lowest)
 
     @cached_property
     def predicted_shift(self) -> Mapping[str, Array]:

@@ -148,13 +148,11 @@ def settling(run: Run, rest: Rest, points: Sequence[str], tolerance: float, lowe
     `tolerance`, m, is for settling times; `lowest`, Hz, the lowest frequency of the robot or loop, or NaN.
     """
     first = max(int(np.searchsorted(run.time, rest.since, side="right")) - 1, 0)
-    after = replace(run, time=run.time[first:], q=run.q[first:], v=run.v[first:])
-    still = np.zeros((1, rest.model.tree.n_v))
-    at_rest = replace(run, model=rest.model, time=np.zeros(1), q=rest.q[None], v=still)
+    at_rest = replace(run, model=rest.model, q=rest.q[None], v=np.zeros((1, rest.model.tree.n_v)))
     settled = {}
     for point in points:
-        moving, place = section_motion(after, point), section_motion(at_rest, point).r[0]
-        path = scipy.interpolate.CubicHermiteSpline(after.time, moving.r, moving.velocity)
+        moving, place = section_motion(run, point), section_motion(at_rest, point).r[0]
+        path = scipy.interpolate.CubicHermiteSpline(run.time[first:], moving.r[first:], moving.velocity[first:])
         settled[point] = _settling(path, place, rest.since, tolerance, lowest)
     return settled
 

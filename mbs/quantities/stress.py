@@ -191,7 +191,7 @@ def _surface(modal: Array, positions: Array, p: Array) -> SurfaceStress:
     count, _, n = modal.shape
     rows = np.einsum("ab,pbn->apn", _distortion(), modal).reshape(-1, n)
     largest, place = np.zeros(len(p)), np.zeros(len(p), dtype=np.int64)
-    for some in in_parts(len(p), max(1, int(CHUNK_BYTES / (rows.shape[0] * 8)))):
+    for some in in_parts(len(p), max(1, int(CHUNK_BYTES / (8 * len(rows))))):
         parts = (rows @ p[some].T).reshape(5, count, -1)
         squares = np.einsum("apt,apt->pt", parts, parts)
         worst = squares.argmax(axis=0)
