@@ -160,11 +160,11 @@ MISTAKES = [
     ('name = "hand"', 'name = "link2"', 'body "link2": expected one body of this name, found 2', ""),
     ('name = "hand"', 'name = "ground"', 'body "ground": name: expected any other name', 'found "ground"'),
     # joints
-    ('"weld"', '"wled"', 'joint "W": type: expected "revolute", "prismatic" or "weld", found "wled"', '"weld"?'),
-    ('"weld"', '"screw"', 'joint "W": type: expected "revolute", "prismatic" or "weld", found "screw"', ""),
+    ('"weld"', '"wled"', 'joint "W": type: expected "revolute", "prismatic"', 'or "weld", found "wled" (did you mean "weld"?)'),
+    ('"weld"', '"screw"', 'joint "W": type: expected "revolute", "prismatic"', 'or "weld", found "screw"'),
     ('"weld"', '"weld"\nmotor = true', 'joint "W": expected no motor', "found motor = true"),
     *(
-        ('"weld"', f'"weld"\n{key} = 1.0', 'joint "W": ', f'"{key}" only in revolute or prismatic joints, found it in a weld')
+        ('"weld"', f'"weld"\n{key} = 1.0', f'joint "W": expected the key "{key}" only in revolute', "found it in a weld")
         for key in ("moment_limit", "gear_ratio", "rotor_inertia", "viscous_friction")
     ),
     ('"weld"', '"prismatic"', 'joint "W": expected an axis with a direction', "found none"),
