@@ -15,6 +15,7 @@ from ...common.arrays import Array
 from ...common.rotations import of_rpy, smallest_turn
 from ...common.structs import struct
 from ...common.validation import Record
+from .. import _core
 from ..fields.field_types import (
     GROUND,
     Direction,
@@ -175,7 +176,8 @@ class JointRecord(Record):
 
     units: ClassVar[tuple[str, ...]] = ()  # of its coordinates, "rad" or "m"
     guess_units: ClassVar[tuple[str, ...]] = ()  # of its numbers in [initial], where these are no coordinates
-    axes: ClassVar[tuple[int, ...]] = ()  # of each entry of q: along x, y, z (0, 1, 2) or about z (5)
+    # by the core: axes along which (0, 1, 2) or about which (3, 4, 5) v moves it; lengths of q and v
+    axes: ClassVar[tuple[int, ...]] = ()
     q_count: ClassVar[int] = 0
     freedoms: ClassVar[int] = 0
     loop_equations: ClassVar[tuple[LoopEquation, ...] | None] = None  # None where it cannot close a loop
@@ -198,8 +200,9 @@ class JointRecord(Record):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: object) -> None:
-        if cls.axes:
-            cls.q_count = cls.freedoms = len(cls.axes)
+        kind = getattr(_core.JointKind, "".join(get_args(cls.model_fields["type"].annotation)), None)
+        if kind is not None:
+            cls.axes, cls.q_count, cls.freedoms = tuple(kind.axes), kind.q_count, len(kind.axes)
 
     @classmethod
     def type_name(cls) -> str:

@@ -33,7 +33,6 @@ class RevoluteJoint(GearedJoint):
 
     type: Literal["revolute"]
     units = ("rad",)
-    axes = (5,)
     loop_equations = (POINT, *ALIGNED)
     along = (Along("turn", 2),)
 
@@ -57,7 +56,6 @@ class PrismaticJoint(GearedJoint):
         return "expected an axis with a direction in a prismatic joint, found none" if key == "axis" else ""
 
     units = ("m",)
-    axes = (2,)
     loop_equations = (*GUIDED, NOT_TURNED)
     along = (Along("slide", 2),)
 
@@ -71,7 +69,6 @@ class ScrewJoint(AxialJoint):
     """Displacement along the axis per turn, m; positive: right-handed."""
 
     units = ("rad",)
-    axes = (5,)
 
     @model_validator(mode="after")
     def _has_lead(self) -> Self:
@@ -92,7 +89,6 @@ class CylindricalJoint(AxialJoint):
     only_in = SPATIAL
 
     units = ("rad", "m")
-    axes = (2, 5)
     loop_equations = GUIDED
     along = (Along("turn", 2), Along("slide", 2))
 
@@ -120,8 +116,6 @@ class UniversalJoint(AxialJoint):
     """Second axis in the axes of the second of `between`, of any length."""
 
     units = ("rad", "rad")
-    q_count = 2
-    freedoms = 2
     loop_equations = (POINT, NOT_TURNED)
     along = (Along("turn", 0, 1), Along("turn", 1, 0, of_outer=True))
     exchanged = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # x and y change places
@@ -159,8 +153,6 @@ class SphericalJoint(JointRecord):
     """Only `false`: motors need coordinates, which spherical joints do not have."""
 
     guess_units = ("rad", "rad", "rad")
-    q_count = 4
-    freedoms = 3
     loop_equations = (POINT,)
     locates: ClassVar[bool] = False  # a loop is best cut here: three equations, no angle
 
@@ -184,7 +176,6 @@ class PlanarJoint(AxialJoint):
     only_in = SPATIAL
 
     units = ("m", "m", "rad")
-    axes = (0, 1, 5)
     loop_equations = (LoopEquation("slide", 2), *ALIGNED)
     along = (Along("slide", 0), Along("slide", 1), Along("turn", 2))
 
@@ -230,8 +221,6 @@ class FreeJoint(JointRecord):
     """Only `false`: motors need coordinates, which free joints do not have."""
 
     guess_units = ("m", "m", "m", "rad", "rad", "rad")
-    q_count = 7
-    freedoms = 6
     loop_equations = ()
     locates: ClassVar[bool] = False
 

@@ -192,12 +192,7 @@ def _turned(tensor: Array, axes: Array) -> Array:
     return np.einsum("ik,jl,kl...->ij...", axes, axes, tensor)
 
 
-PLANAR = {
-    _core.JointKind.revolute: _core.JointKind.revolute,
-    _core.JointKind.prismatic: _core.JointKind.prismatic,
-    _core.JointKind.weld: _core.JointKind.weld,
-    _core.JointKind.planar: _core.JointKind.free,
-}
+UNTURNED = (_core.JointKind.prismatic, _core.JointKind.weld)  # z of their triads may lie in the plane
 SHARED = ("name", "parent", "parent_marker", "inboard_marker", "rotor_inertia", "gear_ratio", "driven", "of_section")
 """What bodies are in the plane and in space alike."""
 
@@ -222,11 +217,10 @@ class Plane(NamedTuple):
 
 def in_plane(parts: ModelParts, is_path: Booleans) -> Plane | None:
     """Return the mechanism in its plane; None without one. `is_path` (rows,): equations that must be kept."""
-    if any(marker.turns for marker in parts.ground) or not all(body.joint in PLANAR for body in parts.bodies):
+    if any(marker.turns for marker in parts.ground) or not all(body.joint.is_planar for body in parts.bodies):
         return None
     frames = _frames(parts)
-    turning = (_core.JointKind.revolute, _core.JointKind.planar)
-    axes = [frame.carrier[:, 2] for body, frame in zip(parts.bodies, frames, strict=True) if body.joint in turning]
+    axes = [frame.carrier[:, 2] for body, frame in zip(parts.bodies, frames, strict=True) if body.joint not in UNTURNED]
     for normal in axes[:1] or np.eye(3)[::-1]:  # the first axis that turns, else those of the global planes
         try:
             return _Reduction(parts, frames, normal).plane(is_path)
@@ -353,7 +347,7 @@ class _Reduction:
         planar = _core.PlanarBody()
         for key in SHARED:
             setattr(planar, key, getattr(body, key))
-        planar.joint, planar.data = PLANAR[body.joint], planar_data(body.data, axes)
+        planar.joint, planar.data = body.joint, planar_data(body.data, axes)
         return planar
 
     def _row(self, row: _core.ConstraintModel) -> _core.ConstraintModel | None:

@@ -103,7 +103,7 @@ def coordinates(model, tree, turned):
         numbers = pose.coordinates
         if joint.type in ("spherical", "free"):
             numbers = np.concatenate([pose.d, logarithm(pose.C)])[-len(record.guess_units) :]
-        elif joint.type == "planar":  # the smallest turn chooses x and y
+        elif record.axes[:2] == (0, 1):  # the smallest turn chooses x and y
             turn = node.inner.triad[:, :2].T @ joint.a.triad[:, :2]
             numbers = np.concatenate([turn @ numbers[:2], numbers[2:]])
         found[joint.name] = record.turned_around(numbers) if turned else numbers

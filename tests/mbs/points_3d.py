@@ -233,6 +233,8 @@ class Mechanism:
                 turn = about(0, x[0]) @ about(1, x[1])
             elif kind == J.planar:
                 turn, way = about(2, x[2]), stacked([x[0], x[1], zero])
+            else:
+                assert kind == J.weld, f"expected a case for {kind}"
         return turn, way
 
     def row(self, k, frames):

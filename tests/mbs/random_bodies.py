@@ -4,7 +4,7 @@ import numpy as np
 from points_3d import Body, J, Mechanism, r
 from random_mechanisms import symmetric
 
-JOINTS = [J.revolute, J.prismatic, J.screw, J.cylindrical, J.universal, J.spherical, J.planar, J.weld, J.free]
+JOINTS = list(J)
 GRAVITY = np.array([0.3, 1.0, -9.81])
 
 

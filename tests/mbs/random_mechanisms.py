@@ -11,9 +11,10 @@ from material_points import random_cloud
 from numpy.polynomial import Legendre, Polynomial
 from rotations import exponential, random_rotation, rotation_about
 
+from ffrobot.mbs.joints.joints import JOINT_TYPES
 from ffrobot.mbs.model.body import Body, BodyPoint, Stiffening, bent_section, from_modal_body, rigid_body
 
-TYPES = ("revolute", "prismatic", "screw", "cylindrical", "universal", "spherical", "planar", "weld", "free")
+TYPES = tuple(JOINT_TYPES)
 
 
 def random_rigid(rng, name):

@@ -45,8 +45,16 @@ void bind_motions_and_forces(nb::module_ &m) {
 void bind_tree_data(nb::module_ &m) {
   bind_fields(nb::class_<PlanarMarker>(m, "PlanarMarker")), bind_fields(nb::class_<PlanarData>(m, "PlanarData"));
   bind_fields(nb::class_<SpatialMarker>(m, "SpatialMarker")), bind_fields(nb::class_<SpatialData>(m, "SpatialData"));
-  bind_values(nb::enum_<JointKind>(m, "JointKind"), FFROBOT_VALUES(JointKind, revolute, prismatic, screw, cylindrical,
-                                                                   universal, spherical, planar, weld, free));
+  nb::enum_<JointKind> joints(m, "JointKind");
+#define FFROBOT_VALUE(name, Joint) joints.value(#name, JointKind::name);
+  FFROBOT_JOINTS(FFROBOT_VALUE)
+  joints.def_prop_ro("q_count", [](JointKind kind) { return spatial_shape(kind).q_count(); });
+  joints.def_prop_ro("axes", [](JointKind kind) {
+    const Freedoms free = spatial_shape(kind).freedoms;
+    return std::vector(free.component, free.component + free.count);
+  });
+  joints.def_prop_ro(
+      "is_planar", [](JointKind kind) { return of_kind(kind, [](auto joint) { return requires { joint.planar; }; }); });
   bind_values(nb::enum_<ConstraintKind>(m, "ConstraintKind"),
               FFROBOT_VALUES(ConstraintKind, point, slide, dot, rotation, turn, coordinate));
   bind_constraints(m), bind_motions_and_forces(m);

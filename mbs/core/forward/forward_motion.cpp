@@ -39,7 +39,7 @@ Scene ForwardMotion::scene_of(const ForwardModel &model) {
   Index n_q = 0, n_v = 0;
   for (const auto &body : model.bodies) {
     const JointShape shape = Spatial::shape(body.joint);
-    n_q += shape.q_count + body.data.modes(), n_v += shape.v_count + body.data.modes();
+    n_q += shape.q_count() + body.data.modes(), n_v += shape.freedoms.count + body.data.modes();
   }
   check(model.q.size() == n_q && model.v.size() == n_v, "a state of the bodies' joints and modes");
   check(model.duration > 0, "a duration above 0");

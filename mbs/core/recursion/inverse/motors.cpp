@@ -10,7 +10,7 @@ DrivenMechanism<Space>::DrivenMechanism(const Mechanism<Space> &m, const Scene &
                                         std::vector<Motor> of_joints_and_cuts, std::vector<char> of_path)
     : mechanism(m), scene(s), motors(std::move(of_joints_and_cuts)), is_path(std::move(of_path)) {
   for (const auto &node : m.nodes) {
-    for (int k = 0; k < node.shape.v_count; ++k)
+    for (int k = 0; k < node.shape.freedoms.count; ++k)
       of_joints.push_back(node.v + k);
     for (int k = 0; k < node.n(); ++k)
       of_modes.push_back(static_cast<int>(node.p_v()) + k);

@@ -43,7 +43,7 @@ PrescribedMotion<Space>::PrescribedMotion(DrivenMechanism<Space> driven, const V
   const Index equations = driven_.mechanism.constraints.size();
   int joint = 0;
   for (const auto &node : driven_.mechanism.nodes)
-    for (int k = 0; k < node.shape.v_count; ++k, ++joint)
+    for (int k = 0; k < node.shape.freedoms.count; ++k, ++joint)
       if (node.shape.freedoms.component[k] >= Space::linear)
         angles_.push_back(joint);
   for (const int v : driven_.of_modes)

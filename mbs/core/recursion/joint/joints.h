@@ -4,12 +4,13 @@
 #include "core/recursion/joint/place.h"
 
 #include <stdexcept>
+#include <type_traits>
 
 namespace ffrobot::recursion {
 
 // Turns about z. q: angle (rad).
 struct Revolute {
-  static constexpr JointShape spatial{1, 1, -1, {5}, false, true, true}, planar{1, 1, -1, {2}, false, true, true};
+  static constexpr JointShape spatial{.freedoms = {5}, .is_centred = true}, planar{.freedoms = {2}, .is_centred = true};
   template <class T> FFROBOT_INLINE static void place(const T *q, const T *v, SpatialPlace<T> &to) {
     to.turn_about_z(q[0]);
     to.w[2] = v[0];
@@ -21,7 +22,7 @@ struct Revolute {
 
 // Slides along z; in the plane along x. q: way (m).
 struct Prismatic {
-  static constexpr JointShape spatial{1, 1, -1, {2}}, planar{1, 1, -1, {0}};
+  static constexpr JointShape spatial{.freedoms = {2}}, planar{.freedoms = {0}};
   template <class T> FFROBOT_INLINE static void place(const T *q, const T *v, SpatialPlace<T> &to) {
     to.r[2] = q[0], to.r_dot[2] = v[0];
   }
@@ -32,7 +33,7 @@ struct Prismatic {
 
 // Turns about z and slides along it by `lead` (m/rad) times the angle. q: angle (rad).
 struct Screw {
-  static constexpr JointShape spatial{1, 1, -1, {5}, false, false};
+  static constexpr JointShape spatial{.freedoms = {5}, .free_are_axes = false};
   template <class T> FFROBOT_INLINE static void place(const T *q, const T *v, double lead, SpatialPlace<T> &to) {
     to.turn_about_z(q[0]);
     to.w[2] = v[0];
@@ -42,7 +43,7 @@ struct Screw {
 
 // Slides along z and turns about it. q: way (m), angle (rad).
 struct Cylindrical {
-  static constexpr JointShape spatial{2, 2, -1, {2, 5}};
+  static constexpr JointShape spatial{.freedoms = {2, 5}};
   template <class T> FFROBOT_INLINE static void place(const T *q, const T *v, SpatialPlace<T> &to) {
     to.r[2] = q[0], to.r_dot[2] = v[0];
     to.turn_about_z(q[1]);
@@ -54,7 +55,7 @@ struct Cylindrical {
 //
 // w = (cos b, 0, sin b) a_dot + (0, 1, 0) b_dot. In axes turned back by b, those of the cross, free are x and y.
 struct Universal {
-  static constexpr JointShape spatial{2, 2, -1, {3, 4}, false, false};
+  static constexpr JointShape spatial{.freedoms = {3, 4}, .free_are_axes = false};
   template <class T> FFROBOT_INLINE static void place(const T *q, const T *v, SpatialPlace<T> &to) {
     T sa, ca, sb, cb;
     sine_and_cosine(q[0], sa, ca);
@@ -80,7 +81,7 @@ template <class T> FFROBOT_INLINE void rotation_of(const T *e, T (&R)[3][3]) {
 // Turns freely. q: unit quaternion (w, x, y, z) from the outer section's axes to the inner one's; v: relative angular
 // velocity in axes of the outer section (rad/s).
 struct Spherical {
-  static constexpr JointShape spatial{4, 3, 0, {3, 4, 5}};
+  static constexpr JointShape spatial{.freedoms = {3, 4, 5}, .quaternion = 0};
   template <class T> FFROBOT_INLINE static void place(const T *q, const T *v, SpatialPlace<T> &to) {
     rotation_of(q, to.R);
     for (int i = 0; i < 3; ++i)
@@ -90,32 +91,14 @@ struct Spherical {
 
 // Slides along x and y of the inner section and turns about their normal. q: two ways (m) and an angle (rad).
 struct PlanarJoint {
-  static constexpr JointShape spatial{3, 3, -1, {0, 1, 5}, true};
+  static constexpr JointShape spatial{.freedoms = {0, 1, 5}, .in_inner_axes = true},
+      planar{.freedoms = {0, 1, 2}, .in_inner_axes = true};
   template <class T> FFROBOT_INLINE static void place(const T *q, const T *v, SpatialPlace<T> &to) {
     to.turn_about_z(q[2]);
     const T r[3] = {q[0], q[1], T(0.)}, r_dot[3] = {v[0], v[1], T(0.)};
     turn_back(to.R, r, to.r);
     turn_back(to.R, r_dot, to.r_dot);
     to.w[2] = v[2];
-  }
-};
-
-// Holds everything.
-struct Weld {
-  static constexpr JointShape spatial{0, 0, -1, {}}, planar{0, 0, -1, {}};
-};
-
-// Holds nothing. q: position in axes of the inner section (m), unit quaternion (w, x, y, z) from the outer section's
-// axes to the inner one's; v: velocity in axes of the inner section, angular velocity in axes of the outer one. In the
-// plane position (x, y) and angle.
-struct Free {
-  static constexpr JointShape spatial{7, 6, 3, {0, 1, 2, 3, 4, 5}, true}, planar{3, 3, -1, {0, 1, 2}, true};
-  template <class T> FFROBOT_INLINE static void place(const T *q, const T *v, SpatialPlace<T> &to) {
-    rotation_of(q + 3, to.R);
-    turn_back(to.R, q, to.r);
-    turn_back(to.R, v, to.r_dot);
-    for (int i = 0; i < 3; ++i)
-      to.w[i] = v[3 + i];
   }
   template <class T> FFROBOT_INLINE static void place(const T *q, const T *v, PlanarPlace<T> &to) {
     T s, c;
@@ -126,76 +109,57 @@ struct Free {
   }
 };
 
-constexpr JointShape spatial_shape(JointKind kind) {
-  switch (kind) {
-  case JointKind::revolute:
-    return Revolute::spatial;
-  case JointKind::prismatic:
-    return Prismatic::spatial;
-  case JointKind::screw:
-    return Screw::spatial;
-  case JointKind::cylindrical:
-    return Cylindrical::spatial;
-  case JointKind::universal:
-    return Universal::spatial;
-  case JointKind::spherical:
-    return Spherical::spatial;
-  case JointKind::planar:
-    return PlanarJoint::spatial;
-  case JointKind::weld:
-    return Weld::spatial;
-  default:
-    return Free::spatial;
+// Holds everything.
+struct Weld {
+  static constexpr JointShape spatial{}, planar{};
+  template <class T, class Place> FFROBOT_INLINE static void place(const T *, const T *, Place &) {}
+};
+
+// Holds nothing. q: position in axes of the inner section (m), unit quaternion (w, x, y, z) from the outer section's
+// axes to the inner one's; v: velocity in axes of the inner section, angular velocity in axes of the outer one.
+struct Free {
+  static constexpr JointShape spatial{.freedoms = {0, 1, 2, 3, 4, 5}, .quaternion = 3, .in_inner_axes = true};
+  template <class T> FFROBOT_INLINE static void place(const T *q, const T *v, SpatialPlace<T> &to) {
+    rotation_of(q + 3, to.R);
+    turn_back(to.R, q, to.r);
+    turn_back(to.R, v, to.r_dot);
+    for (int i = 0; i < 3; ++i)
+      to.w[i] = v[3 + i];
   }
+};
+
+// clang-format off
+#define FFROBOT_CASE(name, Joint) case JointKind::name: return f(Joint());
+// clang-format on
+
+// f of the structure of a joint
+template <class F> FFROBOT_INLINE constexpr auto of_kind(JointKind kind, const F &f) {
+  switch (kind) { FFROBOT_JOINTS(FFROBOT_CASE) }
+  __builtin_unreachable();
+}
+
+constexpr JointShape spatial_shape(JointKind kind) {
+  return of_kind(kind, [](auto joint) { return joint.spatial; });
 }
 
 constexpr JointShape planar_shape(JointKind kind) {
-  switch (kind) {
-  case JointKind::revolute:
-    return Revolute::planar;
-  case JointKind::prismatic:
-    return Prismatic::planar;
-  case JointKind::weld:
-    return Weld::planar;
-  case JointKind::free:
-    return Free::planar;
-  default:
-    throw std::invalid_argument("joint: expected revolute, prismatic, weld or free in the plane");
-  }
+  return of_kind(kind, [](auto joint) -> JointShape {
+    if constexpr (requires { joint.planar; })
+      return joint.planar;
+    throw std::invalid_argument("joint: expected one that exists in the plane");
+  });
 }
 
-template <class T> FFROBOT_INLINE void place(JointKind kind, double lead, const T *q, const T *v, SpatialPlace<T> &to) {
+template <class T, template <class> class Place>
+FFROBOT_INLINE void place(JointKind kind, double lead, const T *q, const T *v, Place<T> &to) {
   to.at_rest();
-  switch (kind) {
-  case JointKind::revolute:
-    return Revolute::place(q, v, to);
-  case JointKind::prismatic:
-    return Prismatic::place(q, v, to);
-  case JointKind::screw:
-    return Screw::place(q, v, lead, to);
-  case JointKind::cylindrical:
-    return Cylindrical::place(q, v, to);
-  case JointKind::universal:
-    return Universal::place(q, v, to);
-  case JointKind::spherical:
-    return Spherical::place(q, v, to);
-  case JointKind::planar:
-    return PlanarJoint::place(q, v, to);
-  case JointKind::weld:
-    return;
-  case JointKind::free:
-    return Free::place(q, v, to);
-  }
-}
-
-template <class T> FFROBOT_INLINE void place(JointKind kind, double, const T *q, const T *v, PlanarPlace<T> &to) {
-  to.angle = to.rate = to.r[0] = to.r[1] = to.r_dot[0] = to.r_dot[1] = T(0.);
-  if (kind == JointKind::revolute)
-    Revolute::place(q, v, to);
-  else if (kind == JointKind::prismatic)
-    Prismatic::place(q, v, to);
-  else if (kind == JointKind::free)
-    Free::place(q, v, to);
+  of_kind(kind, [&](auto joint) __attribute__((always_inline)) {
+    constexpr bool in_space = std::is_same_v<Place<T>, SpatialPlace<T>>;
+    if constexpr (requires { joint.place(q, v, lead, to); })
+      joint.place(q, v, lead, to);
+    else if constexpr (in_space || requires { joint.planar; })
+      joint.place(q, v, to);
+  });
 }
 
 } // namespace ffrobot::recursion

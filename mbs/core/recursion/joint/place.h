@@ -13,7 +13,14 @@
 
 namespace ffrobot::recursion {
 
-enum class JointKind { revolute, prismatic, screw, cylindrical, universal, spherical, planar, weld, free };
+// clang-format off
+// THE list of joints: names in scenes, structures in joints.h
+#define FFROBOT_JOINTS(X) \
+  X(revolute, Revolute) X(prismatic, Prismatic) X(screw, Screw) X(cylindrical, Cylindrical) X(universal, Universal) \
+  X(spherical, Spherical) X(planar, PlanarJoint) X(weld, Weld) X(free, Free)
+// clang-format on
+#define FFROBOT_NAME(name, Joint) name,
+enum class JointKind { FFROBOT_JOINTS(FFROBOT_NAME) };
 
 // Components of (a, alpha) that are free, ascending; velocities and forces of the joint are in this order.
 struct Freedoms {
@@ -26,12 +33,13 @@ struct Freedoms {
 };
 
 struct JointShape {
-  int q_count, v_count;
-  int quaternion; // its first entry among the q of the joint; -1 without
   Freedoms freedoms;
+  int quaternion = -1;        // its first entry among the q of the joint; -1 without
   bool in_inner_axes = false; // translations are along axes of the inner section, not of the outer one
   bool free_are_axes = true;  // what is free is an axis of the outer section
   bool is_centred = false;    // origins of the sections stay together
+
+  constexpr int q_count() const { return freedoms.count + (quaternion >= 0); }
 };
 
 // Of the outer section: turned by R (cosine, sine of it in the plane), its origin at r from the inner one's; relative
@@ -56,6 +64,8 @@ template <class T> struct SpatialPlace {
 
 template <class T> struct PlanarPlace {
   T angle, rate, r[2], r_dot[2];
+
+  FFROBOT_INLINE void at_rest() { angle = rate = r[0] = r[1] = r_dot[0] = r_dot[1] = T(0.); }
 };
 
 } // namespace ffrobot::recursion

@@ -92,7 +92,7 @@ template <class T> FFROBOT_INLINE void frame_axes(const spatial::State<T> &s, Po
 template <class T> FFROBOT_INLINE T joint_angle(const Node<Planar> &node, const T *q, const planar::State<T> &s) {
   if (node.joint == JointKind::revolute)
     return node.body.is_tilted ? T(q[node.q] - s.u[planar::Body::TILT]) : q[node.q];
-  return node.joint == JointKind::free ? q[node.q + 2] : T(0.);
+  return node.joint == JointKind::planar ? q[node.q + 2] : T(0.);
 }
 template <class T> FFROBOT_INLINE T joint_angle(const Node<Spatial> &, const T *, const spatial::State<T> &) {
   return T(0.);

@@ -207,7 +207,7 @@ void Mechanism<Space>::attach_constraints(const std::vector<ConstraintModel> &mo
 template <class Space> void Mechanism<Space>::find_passed_moments(const std::vector<MarkerAt> &loaded, Plan &plan) {
   int first = 0; // in v
   for (BodyModel<Data> &body : plan.bodies) {
-    const int end = first + Space::shape(body.joint).v_count;
+    const int end = first + Space::shape(body.joint).freedoms.count;
     const bool is_constrained = std::ranges::any_of(
         constraints, [&](const Constraint &of) { return of.model.coordinate >= first && of.model.coordinate < end; });
     body.driven = body.driven || is_constrained;
@@ -236,9 +236,9 @@ template <class Space> void Mechanism<Space>::take_body(Node<Space> &node, Plan 
   node.lead = model.lead, node.rotor_inertia = model.rotor_inertia, node.gear_ratio = model.gear_ratio;
   node.rotor_turns = model.joint == JointKind::revolute ? 1 : 0;
   node.q = n_q, node.v = n_v;
-  node.modes_q = n_q + node.shape.q_count, node.modes_v = n_v + node.shape.v_count;
+  node.modes_q = n_q + node.shape.q_count(), node.modes_v = n_v + node.shape.freedoms.count;
   for (Constraint &of : constraints)
-    if (of.model.coordinate >= n_v && of.model.coordinate < n_v + node.shape.v_count) {
+    if (of.model.coordinate >= n_v && of.model.coordinate < n_v + node.shape.freedoms.count) {
       of.node = node.index, of.freedom = of.model.coordinate - n_v;
       of.share = of.model.kind == ConstraintKind::coordinate ? 1 : -1;
       node.has_constraints = true;
@@ -255,8 +255,8 @@ template <class Space> void Mechanism<Space>::take_body(Node<Space> &node, Plan 
   node.first_slot = slots, node.port_slots = node.inboard_slot() + (node.inboard >= 0 ? 2 * Space::dim : 0);
   slots = node.ground_slot() + (node.is_single_grounded ? Space::dim : 0);
   if (node.shape.quaternion >= 0)
-    rotations.push_back(n_v + node.shape.v_count - 3);
-  n_q += node.shape.q_count + node.n(), n_v += node.shape.v_count + node.n();
+    rotations.push_back(n_v + node.shape.freedoms.count - 3);
+  n_q += node.shape.q_count() + node.n(), n_v += node.shape.freedoms.count + node.n();
 }
 
 // At the joint, where modes do not move the section there (a pin's may turn it), else where the body's data have it
@@ -361,8 +361,8 @@ template <class Space> void Mechanism<Space>::collect_actions() {
 // What the recursion in the plane would look up in other nodes at every evaluation
 template <class Space> void Mechanism<Space>::connect_pins() {
   for (Node<Space> &node : nodes) {
-    if (node.joint == JointKind::revolute || node.joint == JointKind::free)
-      node.angle = node.joint == JointKind::free ? node.q + 2 : node.q;
+    if (node.joint == JointKind::revolute || node.joint == JointKind::planar)
+      node.angle = node.joint == JointKind::planar ? node.q + 2 : node.q;
     const int child = node.outboard ? children[node.first_port] : -1;
     node.is_loaded = child >= 0;
     node.carries_pin = child >= 0 && nodes[child].is_pin;

@@ -11,7 +11,7 @@ namespace ffrobot::recursion {
 template <class Space> struct Node {
   typename Space::Body body;
   JointKind joint = JointKind::revolute;
-  JointShape shape{0, 0, -1, {}};
+  JointShape shape{};
   double lead = 0, rotor_inertia = 0, gear_ratio = 1;
   double rotor_turns = 1; // of a rotor per turn of the inner section: 0 in prismatic joints
 

@@ -50,7 +50,7 @@ template <class Space> NaturalSizes<Space>::NaturalSizes(const Mechanism<Space> 
     for (int k = 0; k < shape.freedoms.count; ++k)
       if (shape.freedoms.component[k] < Space::linear)
         of_v_[node.v + k] = length_;
-    const int numbers = shape.quaternion < 0 ? shape.q_count : shape.quaternion; // those of quaternions come last
+    const int numbers = shape.quaternion < 0 ? shape.q_count() : shape.quaternion; // those of quaternions come last
     of_q_.segment(node.q, numbers) = of_v_.segment(node.v, numbers);
     const double of_modes = std::sqrt(node.body.mass) * length_;
     of_q_.segment(node.p_q(), node.n()).setConstant(of_modes);
