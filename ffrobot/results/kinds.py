@@ -290,20 +290,16 @@ def _write_poles(group: h5py.Group, poles: ComplexArray) -> None:
 About = Mapping[str, Any]
 
 
-def _nothing(*_: object) -> str:
-    return ""
-
-
 @struct
 class OwnResults:
     """How results that only one kind of analysis has are written and judged."""
 
     # name of their group in the group of the analysis; "" without one. Its attribute `advice` names remedies
     part: str = ""
-    # writes the details of a run to the group of its analysis
-    write: Callable[[h5py.Group, Run, Any], object] = _nothing
+    # writes details to the group of an analysis; by default their fields to `part`
+    write: Callable[[h5py.Group, Run, Any], object] | None = None
     # text of the verdict by the attributes of `part`, in place of whether motors and patches suffice
-    answer: Callable[[About], str] = _nothing
+    answer: Callable[[About], str] = lambda _: ""
 
     def about(self, group: h5py.Group) -> About:
         """Attributes of the group `part` of an analysis; {} without this group."""
@@ -327,7 +323,7 @@ OF_KIND: Mapping[str, OwnResults] = {
     "tracking": OwnResults("tracking", write_tracking),
     "closed-loop": OwnResults("control", write_loop, _loop_verdict),
 }
-"""Results of single kinds; those that are not here have none of their own."""
+"""Results of single kinds; others have none of their own."""
 
 
 def own_results(group: h5py.Group) -> OwnResults:

@@ -43,7 +43,7 @@ from ..run.result import AnalysisResult, Solution
 from ..scene.scene import Scene
 from .file import FORMAT
 from .judging import write_off_path
-from .kinds import own_results
+from .kinds import OF_KIND
 from .peaks import peaking, write_peaks
 
 if TYPE_CHECKING:  # most scenes have none of these
@@ -123,7 +123,11 @@ def _write_analysis(group: h5py.Group, solution: Solution, result: AnalysisResul
     if wants("energy", "momentum", "constraint_violation"):
         _write_balances(group, result)
     if type(run.details) is not Details:
-        own_results(group).write(group, run, run.details)
+        own = OF_KIND[run.analysis.kind]
+        if own.write:
+            own.write(group, run, run.details)
+        else:
+            write_record(group.create_group(own.part), run.details)
     if wants("off_path"):
         write_off_path(group, solution, result)
 
