@@ -29,7 +29,7 @@ from ..fields.field_types import (
     loaded_reference,
     split_point,
 )
-from ..fields.spelling import IN_SPACE, SPATIAL, NormalInPlane, Spelled, Vector
+from ..fields.spelling import IN_SPACE, SPATIAL, NormalInPlane, Vector
 
 
 class StiffnessSteps(Record):
@@ -305,7 +305,7 @@ class JointRecord(Record):
         return tuple(key for key in keys if getattr(self, key, None))
 
 
-Limit = Annotated[Positive | tuple[Positive, ...], Spelled(Positive)]
+Limit = Positive | tuple[Positive, ...]
 Range = tuple[Quantity, Quantity]
 
 
@@ -314,7 +314,7 @@ class MovingJoint(JointRecord):
 
     motor: bool | None = None
     """Presence of motors; by default in open chains only, and not in spherical and free joints."""
-    position_limit: Annotated[Range | tuple[Range, ...] | None, Spelled(Range)] = None
+    position_limit: Range | tuple[Range, ...] | None = None
     """Range of the coordinate, [lo, hi], rad (sliding: m). No contact force acts beyond it; a warning has
     time and size of the excess."""
     moment_limit: Limit | None = None
@@ -355,7 +355,7 @@ class MovingJoint(JointRecord):
         value, count = self.position_limit, len(self.units)
         if value is None:
             return super().position_limits
-        ranges = tuple(each for each in value if isinstance(each, tuple)) or ((float(value[0]), float(value[1])),)  # type: ignore[arg-type]
+        ranges = tuple((lo, hi) for lo, hi in np.reshape(value, (-1, 2)).tolist())
         if len(ranges) != count:
             wanted = "one pair [least, largest]" if count == 1 else f"{count} pairs [least, largest]"
             raise ValueError(f"expected {wanted} in position_limit, found {len(ranges)}")

@@ -12,7 +12,7 @@ from ...common.keys import Title
 from ...common.validation import Record
 from .._core import TimeFunction
 from ..fields.field_types import GROUND, NotEmpty, Quantity, Reference, Referring, under
-from ..fields.spelling import IN_PLANE, Spelled, Vector
+from ..fields.spelling import IN_PLANE, Vector
 from ..joints.joint import JointRecord
 from ..joints.joints import AnyJoint
 from .bodies import BodyKeys, Payload, Tool
@@ -23,7 +23,7 @@ from .trajectories import Trajectory
 Word = Literal["up", "down", "right", "left", "noflip", "flip", "positive", "negative"]
 """How a joint stands in one of several postures: see `posture.branches`."""
 
-Numbers = Annotated[Quantity | tuple[Quantity, ...], Spelled(Quantity)]
+Numbers = Quantity | tuple[Quantity, ...]
 
 
 class Initial(Referring):
