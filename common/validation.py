@@ -92,6 +92,9 @@ InputFile = Annotated[Path, AfterValidator(existing_file)]
 """A file named by an input file, relative to it; it exists."""
 
 
+_JUDGED = ("value_error", "greater_than", "less_than")  # errors in values of an allowed type
+
+
 def validate(
     record: type[R],
     data: dict[str, Any],
@@ -114,8 +117,8 @@ def validate(
         items = error.errors(include_url=False)
         within = {item["loc"] for item in items}
         kinds = {_describe(item, record, data, space): item["type"] for item in items if not _follows(item, within)}
-        judged = {problem.key for problem, kind in kinds.items() if kind == "value_error"}  # of a type that is allowed
-        problems = [one for one, kind in kinds.items() if kind == "value_error" or one.key not in judged]
+        judged = {problem.key for problem, kind in kinds.items() if kind.startswith(_JUDGED)}
+        problems = [one for one, kind in kinds.items() if kind.startswith(_JUDGED) or one.key not in judged]
         raise InputError("\n".join(f"{path}: {line}" for line in _merge(problems))) from None
 
 
