@@ -48,11 +48,8 @@ def test_distances_from_the_path_do_not_depend_on_outputs():
     assert said["distance_rms"] == pytest.approx(np.sqrt(np.mean(off**2)), rel=1e-2)
 
 
-@pytest.mark.parametrize(
-    ("motor", "message"),
-    [(None, r"motors that fit the mechanism \(2 of them\) for \"joints\", found 1"), (False, "none")],
-)
-def test_moments_that_were_not_computed_are_not_replayed(motor, message):
+@pytest.mark.parametrize(("motor", "count"), [(None, 1), (False, 0)])
+def test_moments_that_were_not_computed_are_not_replayed(motor, count):
     """Of planar scenes with other motors than the mechanism needs; the rest of the file is right."""
     points = {"root": [0.0, 0.0], "tip": [1.0, 0.0]}
     bar = {"mass": 1.0, "inertia": 0.1, "center": [0.5, 0.0], "points": points}
@@ -63,5 +60,6 @@ def test_moments_that_were_not_computed_are_not_replayed(motor, message):
         initial={"angles": {"upper": 0.0, "fore": 1.0}},
         trajectory=[{"name": "tip", "point": "fore.tip", "x": "1 + cos(1)", "y": "sin(1) + 0.1*t**2"}],
     )  # fmt: skip
+    message = rf"motors that fit the mechanism \(2 of them\) for \"joints\", found {count}"
     with pytest.raises(ffrobot.InputError, match=message):
         ffrobot.solve(ffrobot.make_scene(**tables))
