@@ -258,7 +258,7 @@ class Designs:
         folders = [run.folder for run in wanted.runs]
         new = {folder: point for folder, point in zip(folders, points, strict=True) if folder not in self._designs}
         if len(new) > self.most - self.count:
-            raise SpentError
+            raise SpentError(f"ended after {self.count} runs, as many as were allowed")
         if new:
             earlier = tuple(design.row for design in self._designs.values())
             lot = replace(wanted, points=tuple(new.values()), earlier=earlier, wanted=tuple(sorted(self._asked)))

@@ -73,6 +73,12 @@ class Finding(ABC):
     def sections(self) -> Iterator[TextTable]:
         """Yield the tables of text."""
 
+    def failed(self) -> Iterator[str]:
+        """A line about runs that failed, if any did."""
+        if count := len(self.failures):
+            more = f", and {count - 1} more in the table of runs" if count > 1 else ""
+            yield f"failed     {count} of {self.runs} runs, left out: {self.failures[0]}{more}"
+
     @abstractmethod
     def remarks(self) -> Iterator[str]:
         """Notes on the accuracy, failed runs, and the method."""
@@ -149,10 +155,3 @@ def with_unit(text: str, unit: str) -> str:
 def file_name(text: str) -> str:
     """Return `text` with characters that file names should not contain replaced by "_"."""
     return re.sub(r"\W+", "_", text).strip("_")
-
-
-def failed_runs(failures: Sequence[str], runs: int) -> Iterator[str]:
-    """A line about runs that failed, if any did."""
-    if failures:
-        more = f", and {len(failures) - 1} more in the table of runs" if len(failures) > 1 else ""
-        yield f"failed     {len(failures)} of {runs} runs, left out: {failures[0]}{more}"

@@ -208,10 +208,9 @@ def search_from(
                     return Local(first, best, optimum, BEYOND)
         message = KINK if optimum and optimum.kinks else message
     except (SpentError, StuckError) as error:
-        spent = isinstance(error, SpentError)
-        message = f"ended after {evaluations.designs.count} runs, as many as were allowed" if spent else str(error)
         last = best_of(evaluations, [best, *evaluations.searched[begun:]])
-        return Local(first, last, optimum if last is best else None, message, spent=spent)
+        spent = isinstance(error, SpentError)
+        return Local(first, last, optimum if last is best else None, str(error), spent=spent)
     return Local(first, best, optimum, message)
 
 
@@ -263,6 +262,7 @@ def combinations(space: DesignSpace) -> int:
     return prod(len(variable.rows) for variable in space.variables)
 
 
+@np.errstate(invalid="ignore")
 def evolve(evaluations: Evaluations, seed: int, start: Place | None, tell: Callable[[str], None]) -> str:
     """Search by differential evolution, a generation in parallel; return the reason if it ended early, else "".
 
@@ -278,7 +278,7 @@ def evolve(evaluations: Evaluations, seed: int, start: Place | None, tell: Calla
         return np.column_stack([problem.scaled(one.values) if one.completed else failed for one in designs])
 
     limits = (NonlinearConstraint(lambda places: values(places)[1:], -np.inf, 0.0),) if problem.limits else ()
-    with suppress(SpentError), np.errstate(invalid="ignore"):
+    try:
         done = differential_evolution(
             lambda places: values(places)[0], [(0.0, variable.top) for variable in space.variables],
             popsize=max(POPULATION, -(-SMALLEST // count)), maxiter=GENERATIONS, tol=SPREAD, seed=seed, polish=False,
@@ -286,5 +286,6 @@ def evolve(evaluations: Evaluations, seed: int, start: Place | None, tell: Calla
             callback=lambda x, convergence: tell(f"differential evolution, {evaluations.designs.count} runs"),
             integrality=[variable.is_catalogue for variable in space.variables],
         )  # fmt: skip
-        return "" if done.success else f"differential evolution: {done.message}"
-    return f"ended after {evaluations.designs.count} runs, as many as were allowed"
+    except SpentError as error:
+        return str(error)
+    return "" if done.success else f"differential evolution: {done.message}"

@@ -20,7 +20,7 @@ from ..pictures.studies.study import (
 from ..results.verdict import Verdict
 from ..sweep.sweep import number
 from .evaluations import Evaluated
-from .finding import CsvFile, Finding, TextTable, failed_runs, numbers, with_unit
+from .finding import CsvFile, Finding, TextTable, numbers, with_unit
 from .local_search import AIM, Local
 from .responses import KEPT, DesignProblem
 from .variables import DesignSpace, DesignVariable
@@ -240,7 +240,7 @@ class Optimum(Searched, Local):
             yield f"note       {self.message}"
         if len(self.searches) > 1:
             yield f"starts     {self._starts()}"
-        yield from failed_runs(self.failures, self.runs)
+        yield from self.failed()
         how = "the best of the designs that were tried"
         if (stands := self.optimality) and self.feasible:
             how = (

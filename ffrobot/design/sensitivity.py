@@ -21,7 +21,7 @@ from ..sweep.files import number_at
 from ..sweep.sweep import Key
 from .derivatives import Base, Entry, Sample, entries, rough_keys
 from .designs import Designs, Runs, changes_for, may_repeat, parse_key, repeated_steps
-from .finding import CsvFile, Finding, TextTable, failed_runs, file_name, numbers
+from .finding import CsvFile, Finding, TextTable, file_name, numbers
 from .readings import Reading, Response
 from .responses import parse_response
 
@@ -141,7 +141,7 @@ class Sensitivity(Finding):
                 yield f"note       {response}: {reading.remark}"
             for key, one in zip(self.keys, row, strict=True):
                 yield from (f"note       {response} by {key}: {text}" for text in one.notes)
-        yield from failed_runs(self.failures, self.runs)
+        yield from self.failed()
         methods = {one.method for row in self.entries for one in row}
         texts = [words for method, words in HOW.items() if method in methods]
         yield (

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..common.arrays import Array
 from ..pictures.studies.study import Band, Bars, Diagram, Series, StudyTable
-from .finding import CsvFile, Finding, TextTable, failed_runs, file_name, floats, numbers, with_unit
+from .finding import CsvFile, Finding, TextTable, file_name, floats, numbers, with_unit
 from .readings import Reading
 from .spreads import NAMES, Indices, Spread, SpreadStatistics
 
@@ -135,7 +135,7 @@ class Uncertainty(Finding):
                     " --indices computes the effect of each, alone and with others"
                 )
         yield from (f"note       {text}" for text in self.notes)
-        yield from failed_runs(self.failures, self.runs)
+        yield from self.failed()
         how = (
             "± the standard error of as many independent samples: the mean of a Latin hypercube is better; worst case:"
             " the lowest and the highest sample"

@@ -222,20 +222,15 @@ def _angles(scene: "Scene") -> Iterator[str]:
                 f'trajectory "{one.name}": an angle in via changes by {np.degrees(one.largest_turn_of_poses):.4g}° from'
                 " one pose to the next: the section turns the shorter way, half a turn at most; add poses between"
             )
-        if one.joint in sliding:
-            for function in one.components.values():
-                value = np.abs(function.sample(np.linspace(0.0, last, SAMPLES))[0])
-                yield from remarks_on_length(float(np.nan_to_num(value).max()), f'the way of trajectory "{one.name}"')
-        if (
-            getattr(one, "angle", None) is None
-            and one.joint not in turning
-            and getattr(one, "motor", None) not in turning
-        ):
+        slides, turned = one.joint in sliding, {one.joint, getattr(one, "motor", None)} & turning
+        if not slides and not turned and getattr(one, "angle", None) is None:
             continue
         for function in one.components.values():
             value, rate, _ = np.abs(function.sample(np.linspace(0.0, last, SAMPLES)))
             spins = rate[-1] > SPINNING * rate.max() > 0
-            if np.isfinite(value).all() and value.max() > TURNS and not spins:
+            if slides:
+                yield from remarks_on_length(float(np.nan_to_num(value).max()), f'the way of trajectory "{one.name}"')
+            elif np.isfinite(value).all() and value.max() > TURNS and not spins:
                 yield (
                     f'trajectory "{one.name}" reaches {value.max():.4g} rad, {value.max() / (2 * np.pi):.3g} turns:'
                     " angles are in rad; is it in degrees (45*deg)?"
