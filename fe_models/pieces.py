@@ -76,8 +76,7 @@ def _place(x: float, length: float, count: int) -> tuple[int, str]:
     nearest = round(x / length)
     if abs(x - nearest * length) <= ON_A_CUT * length * count:
         return (0, "root") if nearest == 0 else (nearest - 1, "tip")
-    k = min(int(x / length), count - 1)
-    return k, ""
+    return min(int(x / length), count - 1), ""
 
 
 def _piece(

@@ -59,10 +59,11 @@ class _Assembled:
         self.points = np.concatenate([place.points(own) for place, own in nodes])
 
     def mesh(self) -> RawMesh:
-        cells: list[tuple[str, list[int]]] = []
-        for name, instance in self.scopes.items():
-            for number, (kind, nodes) in instance.solids.items():
-                cells.append((kind, [self._node(name, node, f"element {number}") for node in nodes]))
+        cells = [
+            (kind, [self._node(name, node, f"element {number}") for node in nodes])
+            for name, instance in self.scopes.items()
+            for number, (kind, nodes) in instance.solids.items()
+        ]
         same, remarks = self._tied()
         remarks += self._left_out()
         groups = {name: same[group] for name, group in self._node_sets().items()}

@@ -82,8 +82,7 @@ def _included(following: Iterator[str], line: str) -> str | None:
     text = line.lstrip()
     if not text.startswith("*") or text.startswith("**") or "INCLUDE" not in text.upper():
         return None
-    keyword = _keyword(text.strip(), "")
-    if keyword.name == "INCLUDE":
+    if _keyword(text.strip(), "").name == "INCLUDE":
         while text.rstrip().endswith(","):
             text = text.rstrip() + next(following, "").strip()
         return _keyword(text.strip(), "").options.get("INPUT", "")

@@ -82,8 +82,7 @@ def main() -> None:
     end_with_parent()
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     answer = os.fdopen(os.dup(1), "wb")
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 1)  # OpenCASCADE writes to it
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # OpenCASCADE writes to it
     read, arguments, seconds = pickle.load(sys.stdin.buffer)
     allow(seconds)
     reply: Any

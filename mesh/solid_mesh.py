@@ -112,8 +112,7 @@ def _lattice(corners: int, n: int) -> tuple[Array, Integers, Integers]:
 def _gathered(mesh: Mesh, points: Array, triangles: Integers, edges: Integers, cells: Integers, X: Array) -> Surface:
     """One numbering for the points of all processes; a point that several have belongs to the first of them."""
     comm = mesh.comm
-    counts = comm.allgather(len(points))
-    begin = sum(counts[: comm.rank])
+    begin = sum(comm.allgather(len(points))[: comm.rank])
     everything = np.concatenate(comm.allgather(points))
     all_triangles = np.concatenate(comm.allgather(triangles + begin))
     all_edges = np.concatenate(comm.allgather(edges + begin))

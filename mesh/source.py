@@ -3,6 +3,7 @@
 Names of element types are meshio's; nodes are in gmsh's order.
 """
 
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 
@@ -201,16 +202,15 @@ def _tags(count: int, regions: Mapping[str, Integers]) -> tuple[NDArray[np.int32
 
 
 def _only_kind(raw: RawMesh) -> str:
-    counts: dict[str, int] = {}
+    counts = Counter[str]()
     for kind, cells in raw.blocks:
-        counts[kind] = counts.get(kind, 0) + len(cells)
+        counts[kind] += len(cells)
     listed = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
     if not listed:
         shells = sum(map(len, raw.surfaces))
         hint = f": {shells} triangles or quadrilaterals (shells) only" if shells else ""
         raise InputError("expected a mesh of volume elements", f"none{'; '.join((hint, *raw.remarks))}")
-    unsupported = [kind for kind in counts if kind not in _SUPPORTED]
-    if unsupported:
+    if not counts.keys() <= _SUPPORTED.keys():
         known = "tetrahedra of 4 or 10 nodes, hexahedra of 8 or 27 nodes"
         raise InputError(f"expected {known}", f"unsupported elements: {listed}")
     if len(counts) > 1:

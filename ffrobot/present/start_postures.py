@@ -47,8 +47,7 @@ def _joints(model: Model, q: Array) -> Iterator[tuple[str, ...]]:
         if joint.name not in model.tree.carried:
             yield joint.name, "closes a loop", "", ""
             continue
-        node = model.tree.nodes[model.tree.carried[joint.name]]
-        values = node.coordinates(q)
+        values = model.tree.nodes[model.tree.carried[joint.name]].coordinates(q)
         guesses = np.atleast_1d(np.array(model.scene.initial.joints.get(joint.name, np.nan), dtype=float))
         for k, (value, unit) in enumerate(zip(values.tolist(), joint.units, strict=True)):
             guess = guesses[k] if k < len(guesses) else np.nan

@@ -248,8 +248,7 @@ class Results:
 
     def state_spaces(self, analysis: str) -> "tuple[StateSpace, ...]":
         """Return linear models of an analysis, or the controller of a run. Raises `InputError` without either."""
-        is_loop = self.has(f"{analysis}/control")
-        return self.controllers(analysis) if is_loop else self.linear(analysis)
+        return self.controllers(analysis) if self.has(f"{analysis}/control") else self.linear(analysis)
 
     def linear_analysis(self, analysis: str | None) -> str:
         """Return `analysis`, or the first one with linear models. Raises `InputError` if there is none."""
