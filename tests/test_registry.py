@@ -110,13 +110,9 @@ SLOT = '''
 
 from typing import Annotated, ClassVar, Literal
 
-import numpy as np
-
-from ffrobot.common.rotations import exponential, quaternions
 from ffrobot.common.keys import Vector2, Vector3
 from ffrobot.mbs.fields.spelling import Spelled, place
-from ffrobot.mbs.joints.joint import Along, LoopEquation
-from ffrobot.mbs.joints.joint import AxialJoint
+from ffrobot.mbs.joints.joint import Along, AxialJoint, LoopEquation
 
 
 class SlotJoint(AxialJoint):
@@ -127,14 +123,9 @@ class SlotJoint(AxialJoint):
     """Direction of the slot in the axes of the first of `between`, of any length."""
 
     units = ("m",)
-    q_count = 5
-    freedoms = 4
     loop_equations = (LoopEquation("slide", 0), LoopEquation("slide", 1))
     along = (Along("slide", 2),)
     locates: ClassVar[bool] = False  # it leaves a place open: loops are cut here
-
-    def state(self, coordinates):
-        return np.concatenate([coordinates, quaternions(exponential(np.zeros(3)))])
 '''
 
 QUICK_RETURN = """
