@@ -47,6 +47,9 @@ class ExpressionError(ValueError):
         self.position = position
 
 
+ZERO = TimeFunction.constant(0.0)  # what is written as 0
+
+
 def parse_expression(text: str) -> TimeFunction:
     """Translate `text` to a function of time t (s) with exact first and second derivatives.
 
@@ -77,7 +80,7 @@ def parse_expression(text: str) -> TimeFunction:
         raise ExpressionError(text, 1, "nested too deeply") from None
     translation = _Translation(flat, offset)
     if translation.number(tree, 0):
-        return TimeFunction.constant(translation.constants[0])
+        return TimeFunction.constant(value) if (value := translation.constants[0]) else ZERO
     try:
         return TimeFunction.expression(translation.ops, translation.constants)
     except ValueError as error:

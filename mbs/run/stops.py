@@ -13,6 +13,7 @@ import numpy as np
 
 from ...common.arrays import Array, Booleans
 from .._core import TimeFunction
+from ..fields.expressions import ZERO
 from ..posture.posture import misfits
 from ..scene.analysis import TimedAnalysis
 from ..scene.loads import Load
@@ -210,7 +211,7 @@ def unseen_loads(loads: Iterable[Load], ends: Array) -> Iterator[str]:
     times = _even(ends, ENDS.dense)
     for number, load in enumerate(loads, 1):
         for key, function in load.components.items():
-            if not any(function.sample(part)[0].any() for part in np.array_split(times, 32)):
+            if function is not ZERO and not any(function.sample(part)[0].any() for part in np.array_split(times, 32)):
                 yield f"load no. {number}: {key} is 0 at all {len(times)} sampled times; it may have briefer pulses"
 
 

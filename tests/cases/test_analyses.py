@@ -164,7 +164,7 @@ def test_a_run_says_what_does_not_move_it():
     """It starts at zero and stays there, whatever the path, and a pulse that lasts 3e-8 s."""
     bar = {"mass": 1.0, "inertia": 0.1, "center": [0.0, 0.0], "points": {"root": [0.0, 0.0], "tip": [0.5, 0.0]}}
     keys = {"trajectory": [{"name": "turn", "joint": "j", "value": "0.2 + t"}], "gravity": [0.0, 0.0]}
-    keys["load"] = [{"point": "a.tip", "y": "where(abs(t**2 - 1e-3) < 1e-9, 1e5, 0)"}]  # shorter than steps see
+    keys["load"] = [{"point": "a.tip", "x": "0", "y": "where(abs(t**2 - 1e-3) < 1e-9, 1e5, 0)"}]  # brief
     free = {"name": "free", "kind": "forward", "end": 0.1, "output_step": 0.1}
     with ffrobot.solve(
         ffrobot.make_scene(**planar([{"name": "a", "rigid": bar}], [pin("j", "ground", "a.root")], free, **keys))
