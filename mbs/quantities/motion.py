@@ -183,7 +183,7 @@ def node_of(run: Run, body: str) -> Node:
 
 @kept
 def _links(run: Run) -> dict[str, BodyMotion]:
-    parts = [run.at(some) for some in in_parts(len(run.q) or 1, AT_ONCE)]
+    parts = [run.at(some) for some in in_parts(len(run.time) or 1, AT_ONCE)]
     links = {}
     for name, link in run.links.items():
         of = BodyMotion(*map(np.concatenate, zip(*(_motion_of_link(part, link) for part in parts), strict=True)))

@@ -148,7 +148,8 @@ def settling(run: Run, rest: Rest, points: Sequence[str], tolerance: float, lowe
     `tolerance`, m, is for settling times; `lowest`, Hz, the lowest frequency of the robot or loop, or NaN.
     """
     first = max(int(np.searchsorted(run.time, rest.since, side="right")) - 1, 0)
-    at_rest = replace(run, model=rest.model, q=rest.q[None], v=np.zeros((1, rest.model.tree.n_v)))
+    still = np.zeros((1, rest.model.tree.n_v))
+    at_rest = replace(run, model=rest.model, time=np.zeros(1), q=rest.q[None], v=still)
     settled = {}
     for point in points:
         moving, place = section_motion(run, point), section_motion(at_rest, point).r[0]
