@@ -37,7 +37,7 @@ class PartFace:
     point: Array
     # (3,) unit vector: outward normal of a plane face, axis of a bore or shaft, mean normal of others (zero if none)
     direction: Array
-    area: float  # m²
+    area: float  # m², of flat facets
     radius: float | None  # of a bore or shaft, m; None of others
 
 

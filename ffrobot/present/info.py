@@ -159,7 +159,7 @@ def print_inspection(file: Path, part: "Inspection", density: float | None, cons
         radius = "–" if face.radius is None else f"{1000 * face.radius:.5g}"
         direction = f"({', '.join(f'{value + 0.0:.4g}' for value in face.direction.round(4))})"
         rows.append((str(k), face.kind, _point(face.center), direction, radius, f"{1e6 * face.area:.5g}"))
-    console.print(plain_table(("face", "kind", "center mm", "normal or axis", "radius mm", "area mm²"), rows))
+    console.print(plain_table(("face", "kind", "center mm", "normal or axis", "radius mm", "mm² of flat facets"), rows))
     if (more := len(part.faces) - LISTED) > 0:
         console.print(f"and {more} smaller faces")
 
