@@ -213,7 +213,7 @@ def _least_voltage(group: h5py.Group) -> str:
     off = about.get("without_patches", np.nan)
     alone = f"; torques alone are off by {1e3 * off:.3g} mm" if np.isfinite(off) else ""
     limits = [np.ravel(one.attrs["limit"]) for one in group["pzt"].values() if "limit" in one.attrs]
-    is_one = not limits or np.ptp(np.concatenate(limits)) == 0.0
+    is_one = not limits or np.unique(np.concatenate(limits)).size == 1
     is_one &= not any("range" in one.attrs for one in group["pzt"].values())
     size = f"{about['least_voltage']:.3g} V" if is_one else f"{100 * about['least_share']:.3g} % of limits"
     if np.isfinite(price := about.get("tolerance_price", np.nan)):

@@ -123,11 +123,13 @@ def test_limits_that_are_too_small(scene):
 def test_patches_that_are_not_needed(scene):
     """In two seconds the torques alone leave less than a thousandth of the path; the replay is this distance."""
     changes = [("/0.6", "/2.0"), ("end = 0.6", "end = 2.0"), ("tolerance = 1e-4", "tolerance = 1e-3")]
+    changes.append(("\nlimit = 200.0", ""))  # which the summary says in V, too
     with ffrobot.solve(scene(*changes)) as results:
         about, verdict = results.attributes("carried/tracking"), results.verdict["carried"]
         assert about["without_patches"] == pytest.approx(off_path(results, "without_patches"), rel=0.05)
         assert not about["is_needed"]
         assert any("patches are not needed" in text for text in verdict.advice)
+        assert f"least voltage {about['least_voltage']:.3g} V" in verdict.answer
     with ffrobot.solve(scene(alone=True)) as results:
         about, verdict = results.attributes("carried/tracking"), results.verdict["carried"]
         assert about["is_needed"]
