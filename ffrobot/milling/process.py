@@ -259,7 +259,7 @@ def growth(tip: Tip, cutter: Milling, depth: float, speed: float) -> float:
 
 
 def limit_depth(tip: Tip, cutter: Milling, speed: float, bounds: Sequence[float]) -> float:
-    """Return the least depth (m) between `bounds` (m) with chatter (`growth` above 1), to 0.1 %; infinite if none has.
+    """Return the least depth (m) between `bounds` (m) with chatter (`growth` above 1), to 1 %; infinite if none has.
 
     `speed` of the spindle in rad/s. With chatter at the lower bound, a depth below it; 0 below `THINNEST`.
     """

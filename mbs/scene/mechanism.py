@@ -124,15 +124,16 @@ class MechanismKeys(Record):
     def edges(self) -> list[Edge]:
         """All joints as edges between bodies, ranked by where loops are cut.
 
-        Loops are cut first at spherical joints, then at joints without forces, with friction or loads, with a value in
-        [initial], with a rate there, and last with a rotor or a trajectory. Motors without rotors, and joints whose
-        coordinates analyses read, belong to the tree.
+        Loops are cut first at spherical joints (without a value in [initial], then others), then at joints without
+        forces, with friction or loads, with a value, with a rate, and last with a rotor or a trajectory. Motors without
+        rotors, and joints whose coordinates analyses read, belong to the tree.
         """
         return [Edge(joint.between, self._rank(joint)) for joint in self.joint]
 
     def _rank(self, joint: AnyJoint) -> int:
+        values, rates = self.initial.named("joints"), self.initial.named("joint_rates")
         if not joint.locates:
-            return 6
+            return 6 + (joint.name not in values | rates)
         if joint.loop_equations is None or joint.asks_for_coordinate:
             return 0
         if getattr(joint, "rotor_inertia", 0.0):
@@ -141,9 +142,9 @@ class MechanismKeys(Record):
             return 0
         if any(trajectory.coordinate_of == joint.name for trajectory in self.trajectory):
             return 1
-        if joint.name in self.initial.named("joint_rates"):
+        if joint.name in rates:
             return 2
-        if joint.name in self.initial.named("joints"):
+        if joint.name in values:
             return 3
         return 4 if joint.frictions or any(load.joint == joint.name for load in self.load) else 5
 

@@ -6,7 +6,7 @@ Starts in which a joint of a loop, or a tool, would be turned over are none.
 import numpy as np
 import pytest
 from four_bar import SIDES, closed, in_3d, planar
-from tables_3d import X, Y, Z, revolute, rigid, scene
+from tables_3d import X, Y, Z, joint, revolute, rigid, scene
 
 import ffrobot
 
@@ -108,6 +108,16 @@ def test_tools_point_along_their_direction(pitch, is_near):
     else:
         with pytest.raises(ffrobot.InputError, match=r'"tool" is turned over.*from .initial. joints'):
             ffrobot.solve(ffrobot.make_scene(**tables))
+
+
+@pytest.mark.parametrize("named", ["S", "T"])
+def test_of_two_spherical_joints_that_without_a_value_is_cut(named):
+    """The other one says how the coupler stands about its own axis."""
+    bodies = [rigid(name, tip=X) for name in "abc"]
+    joints = [revolute("A", "ground", "a.root"), revolute("D", "ground", "c.root", at=X)]
+    joints += [joint("S", "spherical", "a.tip", "b.root"), joint("T", "spherical", "b.tip", "c.tip")]
+    made = ffrobot.make_scene(**scene(bodies, joints, RUN, initial={"joints": {named: [0.1, 0.0, 0.0]}}))
+    assert made.joint[made.topology.carriers["b"].joint].name == named
 
 
 TURN = 2 * np.pi
