@@ -1,5 +1,6 @@
 """The commands that study one robot: `bench`, `fit`, `map` and `smooth`."""
 
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -197,14 +198,11 @@ def _frequencies(text: str | None) -> "Array":
 
     if text is None:
         return np.zeros(0)
-    try:
+    with suppress(ValueError):
         first, last, count = text.split(":")
-        ends, number = (float(first), float(last)), int(count)
-    except ValueError:
-        ends, number = (0.0, 0.0), 0
-    if not (0.0 <= ends[0] <= ends[1] < np.inf and 1 <= number <= 10_000):
-        raise InputError("--response: expected FIRST:LAST:COUNT in Hz, such as 1:100:200", f'"{text}"')
-    return np.linspace(*ends, number)
+        if 0.0 <= float(first) <= float(last) < np.inf and 1 <= int(count) <= 10_000:
+            return np.linspace(float(first), float(last), int(count))
+    raise InputError("--response: expected FIRST:LAST:COUNT in Hz, such as 1:100:200", f'"{text}"')
 
 
 @click.command()

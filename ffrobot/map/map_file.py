@@ -19,7 +19,6 @@ from .pose_map import STATUS, PoseMap
 
 FORMAT, FORMAT_VERSION = "ffrobot-map", 1
 TABLE, FILE = "table.csv", "map.h5"
-METRES = ("sag", "place", "robot", "milling_depth", "milling_best_depth", "milling_lobes", "milling_deviation")
 UNITS = {
     "frequency": "Hz",
     "compliance": "m/N, rad/N, m/(N·m), rad/(N·m)",
@@ -29,7 +28,9 @@ UNITS = {
     "torque": "N·m or N",
     "best_turn": "rad",
     "best_turn_depth": "m",
-} | dict.fromkeys(METRES, "m")
+} | dict.fromkeys(
+    ("sag", "place", "robot", "milling_depth", "milling_best_depth", "milling_lobes", "milling_deviation"), "m"
+)
 NOT_IN_TABLE = ("compliance", "response", "robot", "milling_lobes")
 
 

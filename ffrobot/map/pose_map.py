@@ -159,10 +159,8 @@ def plan_map(
     keeps = orientation == "start"
     if orientation == "auto":
         keeps = any(axis.is_place for axis in axes) and any(path.orientation is not None for path in loaded.trajectory)
-    response = np.zeros(0) if frequencies is None else frequencies
-    return MapPlan(
-        scene, axes, point or default_point(loaded), keeps, count, frequencies=response, folder=folder, milling=milling
-    )
+    point, at = point or default_point(loaded), np.zeros(0) if frequencies is None else frequencies
+    return MapPlan(scene, axes, point, keeps, count, frequencies=at, folder=folder, milling=milling)
 
 
 def default_point(scene: Scene) -> str:
