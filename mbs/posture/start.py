@@ -133,17 +133,16 @@ def displaced_joints(model: Model, start: State, joints: Container[str] | None =
     fastest = float(np.abs(guess.v / np.where(scales > 0, scales, np.inf)).max(initial=0.0))
     q, v, nodes = start.q - guess.q, start.v - guess.v, (node for node in model.tree.nodes if node.joint.units)
     off = [(node.joint.name, q[node.q], v[node.v], scales[node.v]) for node in nodes]
-    rates = _numbers(model, initial.joint_rates, "joint_rates")
+    given = _numbers(model, initial.joint_rates, "joint_rates")
     for one, at in zip(model.cut, model.along_cut.motions(start.q[None], start.v[None], np.zeros(1)), strict=True):
         name, size = one.joint.name, np.array(1.0 if one.row.kind == "turn" else model.size)
-        rate = rates[name][one.number] if name in rates else 0.0
-        off.append((name, at.coordinate - one.guess, at.rate - rate, size))
-    with_values, with_rates = initial.named("joints"), initial.named("joint_rates")
+        off.append((name, at.coordinate - one.guess, at.rate - given.get(name, np.zeros(3))[one.number], size))
+    values, rates = initial.named("joints"), initial.named("joint_rates")
     moved = dict.fromkeys(
         name
         for name, ways, changes, sizes in off
         if joints is None or name in joints
-        for names, way, most in ((with_values, ways, sizes), (with_rates, changes, fastest * sizes))
+        for names, way, most in ((values, ways, sizes), (rates, changes, fastest * sizes))
         if name in names and np.any(np.abs(way) > AWAY * most)
     )
     if moved:
