@@ -67,8 +67,7 @@ class PoseEvaluator:
             raise InputError(
                 f"{model.scene.path}: joint: expected no more motors than degrees of freedom", quoted(model.motors)
             )
-        geared = [name.replace("motor/", "joint/") for name in shafts]
-        self.motors = (*(name for name in direct if name not in geared), *shafts)
+        self.motors = (*(name for name in direct if name.replace("joint/", "motor/") not in shafts), *shafts)
         tree, segments = self.model.tree, list[tuple[Section, Section]]()
         for number, node in enumerate(tree.nodes):
             ends = [other.inner for other in tree.nodes if other.inner.body == number]
