@@ -124,9 +124,9 @@ class MechanismKeys(Record):
     def edges(self) -> list[Edge]:
         """All joints as edges between bodies, ranked by where loops are cut.
 
-        Loops are cut first at spherical joints (without a value in [initial], then others), then at joints without
-        forces, with friction or loads, with a value, with a rate, and last with a rotor or a trajectory. Motors without
-        rotors, and joints whose coordinates analyses read, belong to the tree.
+        Loops are cut first at spherical joints, those without a value in [initial] before others. Then come joints
+        without forces, with friction or loads, with a value, with a rate, and last with a rotor or a trajectory. Motors
+        without rotors, and joints whose coordinates analyses read, belong to the tree.
         """
         return [Edge(joint.between, self._rank(joint)) for joint in self.joint]
 
