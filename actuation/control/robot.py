@@ -130,7 +130,7 @@ class PatchSignals:
     omega: Array  # (served,) rad/s, natural frequencies without attachment modes
     gain: Array  # (k, m) V√kg/N, voltages per force on each of these coordinates
     volts: Array  # (k, m) V/(m·√kg), readings per unit of each coordinate
-    own: Array  # (m, n) these coordinates from all n modal coordinates p of the link
+    own: Array  # (m, n) these coordinates from all n modal coordinates p of the link, no unit
 
 
 @struct

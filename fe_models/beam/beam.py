@@ -40,7 +40,7 @@ class FamilyModel:
     fields: Mapping[int, sp.csr_matrix]
 
     def motion(self, places: Sequence[int]) -> Array:
-        """Rows (r, m) of the `fields` at the stations `places`, station by station: translations, then rotations."""
+        """Rows (r, m) of the `fields` at the stations `places`, one by one: translations (m), then rotations (rad)."""
         return np.array([values[place].toarray()[0] for place in places for values in self.fields.values()])
 
 

@@ -57,11 +57,11 @@ class Inertia:
 
 @struct
 class ModeSet:
-    """Modes, ascending: `omega2` ω² (n,) in rad²/s², the family of each or of its loads, X (m, n) with XᵀMX = I."""
+    """Modes, ascending: `omega2` ω² (n,) in rad²/s², the family of each or of its loads."""
 
     omega2: Array
     families: tuple[str, ...]
-    X: Array
+    X: Array  # (m, n) in 1/√kg, with XᵀMX = I
 
     def followed_by(self, more: "ModeSet") -> "ModeSet":
         """Return these modes and, after them, `more`."""

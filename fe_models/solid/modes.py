@@ -139,7 +139,10 @@ def section_motion(
 
 
 def names(motion: Sequence[Array]) -> list[str]:
-    """Family of each mode, by `section_motion` (rows, n) in each family; "local" where sections move little."""
+    """Return the family of each of n modes; "local" where sections have less than half of its motion.
+
+    `motion`: of each of `FAMILIES`, m·√kg, (rows, n) by `section_motion`, whose squares are shares of kinetic energy.
+    """
     share = np.array([np.sum(rows**2, axis=0) for rows in motion])
     total, first = share.sum(axis=0), share.argmax(axis=0)
     return [FAMILIES[i] if whole >= 0.5 else LOCAL for whole, i in zip(total, first, strict=True)]

@@ -166,7 +166,7 @@ class Results:
 
     @property
     def notes(self) -> dict[str, list[str]]:
-        """Properties of correct results, by analysis."""
+        """Remarks by analysis that are no warnings: on properties of the run, not on errors."""
         return self._texts("notes")
 
     def _texts(self, kind: str) -> dict[str, list[str]]:

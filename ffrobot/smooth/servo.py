@@ -203,7 +203,7 @@ class Servo:
 
     @property
     def is_invertible(self) -> bool:
-        """Whether `margins` are short; near the imaginary axis responses at controller zeros never decay, or slowly."""
+        """Whether inverse controllers settle soon: slowly, if zeros of a controller are near the imaginary axis."""
         return max(self.margins) <= LASTING
 
     def command(self, step: float, position: Array, rate: Array) -> Array:

@@ -44,7 +44,7 @@ class CompliantGear(NamedTuple):
     damping: float
 
     def twist(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """Return the twist δ (…,), rad or m, and its rate δ̇, rad/s or m/s, at q (…, n_q), v (…, n_v)."""
+        """Return the twist δ (…,), rad or m, and its rate δ̇, rad/s or m/s, at q (…, n_q), v (…, n_v), SI."""
         a, b = self.motor, self.joint
         return q[..., a.q.start] - self.sign * q[..., b.q.start], v[..., a.v.start] - self.sign * v[..., b.v.start]
 

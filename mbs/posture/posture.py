@@ -68,9 +68,9 @@ def _joints(model: Model, are: Booleans) -> tuple[str, ...]:
 
 
 def paths_by_bending(model: Model, q: Array) -> tuple[int, tuple[str, ...]]:
-    """How many path equations move only joints that loops lock with rigid links at q (n_q,), rad and m; these joints.
+    """Number of path equations that only bending links can meet, and the joints that loops would lock with rigid links.
 
-    0 of robots without flexible links.
+    At q (n_q,), rad and m; 0 of robots without flexible links.
     """
     is_loop, now = model.loop_rows, np.zeros(1)
     if not is_loop.any() or not any(node.body.n_modes for node in model.tree.nodes):

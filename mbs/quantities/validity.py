@@ -367,7 +367,7 @@ def shape_from_chord(link: ModalBody, p: Array) -> tuple[Array, Array, Array]:
 
 
 def largest(bodies: Mapping[str, Bending]) -> tuple[str, Bending] | None:
-    """Name and measures of the link with the worst results, first of those beyond small deformations; None if none."""
+    """Name and measures of the link with the worst results, beyond small deformations first; None without links."""
     return max(bodies.items(), key=lambda item: (item[1].is_beyond, item[1].missing.of_length), default=None)
 
 

@@ -87,7 +87,7 @@ def telling(times: Array, values: Array, sizes: Array) -> Indices:
 
 
 def about_highest(some: Indices, quantities: Array, beside: int = 1) -> Indices:
-    """Numbers of all samples about the `LOOKS.highest` largest local maxima of each of `quantities` (T, columns).
+    """Numbers of all samples about the `LOOKS.highest` largest local maxima of `quantities` (T, columns), any unit.
 
     Quantities are known at the samples with numbers `some` (T,). Samples from `beside` of these before a maximum to as
     many after it count.

@@ -109,7 +109,7 @@ class Analysis(Referring):
         return getattr(self, "check", None) is not None
 
     def run(self, context: Any) -> Any:
-        """Return the run of the analysis."""
+        """Return the `Run` of the analysis in a `Context`: the scene's model, earlier runs and what watches."""
         raise NotImplementedError
 
     def needs(self) -> Iterator[Need]:

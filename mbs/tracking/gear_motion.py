@@ -93,7 +93,10 @@ def _without_jumps(asked: Transition, meshes: tuple[Array, Array], near: Tracked
 
 
 def behind_gears(asked: Transition, tracked: Tracked, step: float) -> Tracked:
-    """The motion `tracked` with its gears, extended by multiples of `step` (s) until damped gears are at rest."""
+    """Return the motion `tracked`, a solution of the problem `asked`, with its compliant gears.
+
+    It is extended by multiples of `step` (s) until damped gears are at rest.
+    """
     driven, gears = asked.driven, asked.gears
     assert isinstance(driven, GearedServo)
     assert gears is not None
