@@ -11,7 +11,7 @@ from dolfinx import fem
 from dolfinx.fem import petsc
 from mpi4py import MPI
 
-from ffrobot.mesh.compat import compiled_form
+from ffrobot.mesh.compat import compiled_form, function_space
 
 PASSING = np.array([0.25e-3, 0.5e-3, 1e-3, 2e-3])  # m from an end of the patch, where its strain passes into the strip
 
@@ -41,8 +41,8 @@ class SolidStrip:
 
         cells = dolfinx.mesh.locate_entities(box, 3, filled)
         mesh = dolfinx.mesh.create_submesh(box, 3, cells)[0]
-        V = fem.VectorFunctionSpace(mesh, ("Lagrange", 2))
-        places = fem.FunctionSpace(mesh, ("DG", 0))
+        V = function_space(mesh, 2, (3,))
+        places = function_space(mesh, 0)
         middle = places.tabulate_dof_coordinates()
         layer = middle[:, 1] > h / 2
 

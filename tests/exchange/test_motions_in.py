@@ -17,7 +17,7 @@ EPOCH = 1_700_000_000
 
 
 def write(path, header, rows, separator=","):
-    path.write_text("\n".join([header, *(separator.join(map(repr, row)) for row in rows)]) + "\n", encoding="utf-8")
+    path.write_text("\n".join([header, *(separator.join(map(str, row)) for row in rows)]) + "\n", encoding="utf-8")
     return path
 
 
