@@ -9,7 +9,6 @@ import platform
 import re
 import sys
 from collections.abc import Callable
-from contextlib import suppress
 from os import PathLike
 from pathlib import Path
 from typing import TextIO, TypeVar
@@ -101,10 +100,9 @@ class _LogFile(logging.FileHandler):
         click.echo(
             f"ffrobot: {self.baseFilename}: log ends here: {getattr(error, 'strerror', None) or error}", err=True
         )
-
-    def close(self) -> None:
-        with suppress(OSError):
-            super().close()
+        assert self.stream is not None
+        with open(os.devnull, "wb") as nowhere:  # for what Python writes yet as it ends
+            os.dup2(nowhere.fileno(), self.stream.fileno())
 
 
 def log_warning(
