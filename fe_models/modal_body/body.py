@@ -157,7 +157,7 @@ class ModalBody(Integrals, Frozen):
         return float(self.interfaces["root"].position[0]) + self.length / 2
 
     def interpolate(self, x: float) -> Interface:
-        """Mode shapes at the point `x` (m from the root) on the axis.
+        """Mode shapes at the place `x`, m, on the axis of the link.
 
         With `stations.element` all six components are the cubic through the four stations of the element: exactly the
         finite element functions of a beam, of either theory. Otherwise motion along y and z is the cubic Hermite
