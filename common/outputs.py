@@ -8,6 +8,7 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from io import BytesIO
 from pathlib import Path
+from typing import TextIO
 
 from . import checksum
 from .errors import InputError, is_own_fault
@@ -135,3 +136,8 @@ def _resolved(path: Path) -> Path:
     with suppress(OSError, RuntimeError, ValueError):
         return path.resolve()
     return path.absolute()
+
+
+def discard(stream: TextIO) -> None:
+    """Discard what `stream` has not written yet, so that Python does not retry as it ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, TextIO
 
 from ..common.errors import FfrobotError
 from ..common.libraries import missing
+from ..common.outputs import discard
 from ..common.parallel import is_first
 from ..run.watcher import Watcher
 
@@ -158,4 +159,4 @@ def without_output() -> None:
     try:
         sys.stdout.flush()
     except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        discard(sys.stdout)

@@ -16,7 +16,7 @@ from typing import TextIO, TypeVar
 import click
 
 from ..common.errors import FfrobotWarning
-from ..common.outputs import check_file_name
+from ..common.outputs import check_file_name, discard
 
 
 class _FileName(click.Path):
@@ -101,8 +101,7 @@ class _LogFile(logging.FileHandler):
             f"ffrobot: {self.baseFilename}: log ends here: {getattr(error, 'strerror', None) or error}", err=True
         )
         assert self.stream is not None
-        with open(os.devnull, "wb") as nowhere:  # for what Python writes yet as it ends
-            os.dup2(nowhere.fileno(), self.stream.fileno())
+        discard(self.stream)
 
 
 def log_warning(
