@@ -21,6 +21,9 @@ def in_parts(count: int, size: int) -> list[slice]:
 
 
 def null_space(J: Array, tolerance: float) -> Array:
-    """Orthonormal basis (k, m) of the null space of J (r, k): singular values below `tolerance` times the largest."""
+    """Orthonormal basis (k, m), no unit, of J's null space: singular values up to `tolerance` times the largest.
+
+    J (r, k) is in any unit.
+    """
     _, sizes, V = np.linalg.svd(J)
     return V[np.count_nonzero(sizes > tolerance * sizes.max(initial=0.0)) :].T

@@ -83,7 +83,7 @@ def read(dataset: h5py.Dataset) -> Any:
 
 
 def numbers(item: object, name: str) -> NDArray[np.float64]:
-    """Read a dataset of numbers. Raises `InputError` where `item`, which messages call `name`, is none."""
+    """Read numbers of any shape and unit. Raises `InputError` where `item`, which messages call `name`, is none."""
     if not isinstance(item, h5py.Dataset) or item.dtype.kind not in "fiub":
         kind = item.dtype.kind if isinstance(item, h5py.Dataset) else "group"
         raise InputError(f"{name}: expected a dataset of numbers", _KINDS.get(kind, kind))

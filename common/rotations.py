@@ -30,14 +30,14 @@ def exponential(vectors: Array) -> Array:
 
 
 def left_jacobian(vectors: Array) -> Array:
-    """J_l (…, 3, 3) of rotation vectors φ (…, 3), rad: exp(φ + δφ) = exp(J_l δφ) exp(φ) to first order."""
+    """J_l (…, 3, 3), no unit, of rotation vectors φ (…, 3), rad: exp(φ + δφ) = exp(J_l δφ) exp(φ) to first order."""
     return np.eye(3) + _of_skew(vectors, 2, 3)
 
 
 def left_jacobian_slope(vector: Array, of: Array) -> Array:
     """∂(J_l(φ) x)/∂φ (3, 3) of φ `vector` (3,) and x `of` (3,): −a x~ + (a' φ×x + b' φ×(φ×x)) 2φᵀ − b (φ×x)~ − b φ~x~.
 
-    J_l = I + a φ~ + b φ~²; a', b' are the derivatives of a, b by φ². φ in rad, x in any unit.
+    J_l = I + a φ~ + b φ~²; a', b' are the derivatives of a, b by φ². φ in rad, x and the result in any one unit.
     """
     across = np.cross(vector, of)
     (a, a_slope), (b, b_slope) = series(2, vector @ vector), series(3, vector @ vector)

@@ -21,7 +21,7 @@ CellName = Literal["tetrahedron", "hexahedron"]
 class Cell:
     """Topology of a cell in gmsh's order of nodes: v corners, m facets, e edges."""
 
-    corners: Array  # (v, 3) of the reference cell, edges of 1
+    corners: Array  # (v, 3) of the reference cell, edges of 1, no unit
     facets: Integers  # (m, 3 or 4) corners of each facet, counter-clockwise seen from outside
     edges: Integers  # (e, 2) corners of each edge; the node of degree 2 on edge k is number v + k
     nodes: dict[int, int]  # number of nodes by degree
@@ -79,7 +79,7 @@ TO_GMSH = {
 
 
 def in_gmsh_order(kind: str, cells: Integers, as_vtk: Mapping[str, list[int]] = MappingProxyType({})) -> Integers:
-    """Reorder nodes of cells (c, v) of type `kind` from VTK's order, or one that `as_vtk` turns into it, to gmsh's."""
+    """Reorder nodes (c, v) of cells of type `kind` from VTK's order, or one that `as_vtk` turns into it, to gmsh's."""
     for order in (as_vtk.get(kind), TO_GMSH.get(kind)):
         cells = cells if order is None else cells[:, order]
     return cells
@@ -92,7 +92,7 @@ _BLOCK = 20_000  # cells integrated at a time
 
 @lru_cache
 def reference_nodes(cell: CellName, degree: int) -> Array:
-    """Nodes (v, 3), without unit, of the reference cell: corners, middles of edges, faces and the hexahedron."""
+    """Nodes (v, 3), no unit, of the reference cell: corners, middles of edges, faces and the hexahedron."""
     shape = CELLS[cell]
     if degree == 1:
         return shape.corners
@@ -113,7 +113,7 @@ def _element(cell: CellName, degree: int) -> tuple[Any, Integers]:
 
 
 def jacobians(nodes: Array, cell: CellName, degree: int, X: Array) -> Array:
-    """Derivatives ∂x_i/∂X_d (c, q, 3, 3), m, of cells with `nodes` (c, v, 3), m, at reference points X (q, 3)."""
+    """Derivatives ∂x_i/∂X_d (c, q, 3, 3), m, of cells with `nodes` (c, v, 3), m, at X (q, 3), no unit."""
     element, order = _element(cell, degree)
     return np.einsum("dqv,cvi->cqid", element.tabulate(1, X)[1:, :, order, 0], nodes, optimize=True)
 

@@ -66,7 +66,7 @@ def assembly() -> str:
 def create_solid_mesh(comm: MPI.Comm, cell: CellName, degree: int, cells: Integers, points: Array) -> Mesh:
     """Mesh of tetrahedra or hexahedra, distributed over `comm` without ghost cells; every rank calls with its share.
 
-    `degree` 1 or 2 of the geometry, `cells` (c, v) points of each cell in gmsh's order of nodes, `points` (p, 3) in m.
+    `degree` 1 or 2 of the geometry, `cells` (c, v) numbers of each cell's points in gmsh's order, `points` (p, 3) in m.
     """
     # dolfinx's own order of nodes: dolfinx[i] = gmsh[order[i]].
     order = dolfinx.cpp.io.perm_gmsh(getattr(CellType, cell), cells.shape[1])
@@ -88,7 +88,7 @@ def cell_name(mesh: Mesh) -> str:
 
 
 def geometry_nodes(mesh: Mesh) -> Integers:
-    """Return nodes (c, v) of each local cell, rows of `mesh.geometry.x`, in dolfinx's order; corners first."""
+    """Return v nodes (c, v) of each local cell, rows of `mesh.geometry.x`, in dolfinx's order; corners first."""
     dofmap = mesh.geometry.dofmap
     cells = mesh.topology.index_map(mesh.topology.dim).size_local
     if not _OLD:

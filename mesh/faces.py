@@ -32,7 +32,7 @@ AREA = 1e-9  # of the bed of a patch, relative, that may be off
 
 @struct
 class PartBoundary:
-    """The boundary of a part; SI units."""
+    """The boundary of a part, p points, b facets; SI units."""
 
     points: Array  # (p, 3) of the part, m
     facets: Integers  # (b, 3 or 4) corners, counter-clockwise seen from outside

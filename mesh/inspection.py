@@ -32,8 +32,8 @@ class PartFace:
 
     # plane, bore (hollow) and shaft (solid) for closed cylinders, else curved
     kind: Literal["plane", "bore", "shaft", "curved"]
-    center: Array  # (3,)
-    # (3,) by which an interface finds it: the center of a bore or shaft, else a place on it near its center
+    center: Array  # (3,) m
+    # (3,), m, by which an interface finds it: the center of a bore or shaft, else a place on it near its center
     point: Array
     # (3,) unit vector: outward normal of a plane face, axis of a bore or shaft, mean normal of others (zero if none)
     direction: Array

@@ -15,7 +15,7 @@ Tags = NDArray[np.int32]
 
 @struct
 class PartMesh:
-    """A solid part, meshed, in m."""
+    """A solid part, meshed, in m: p points, c cells, f tagged facets."""
 
     points: Array  # (p, 3) in m, in the link's frame once the part is placed
     cells: Integers  # (c, v) points of each cell, in gmsh's order of nodes
@@ -41,12 +41,12 @@ class PartMesh:
 
     @property
     def corners(self) -> Integers:
-        """Corner points (c, 4 or 8) of each cell."""
+        """Numbers (c, 4 or 8) of each cell's corner points."""
         return self.cells[:, : len(self.shape.corners)]
 
     @property
     def cell_facets(self) -> Integers:
-        """Corner points (c·m, 3 or 4) of the m facets of every cell, cell by cell."""
+        """Numbers (c·m, 3 or 4) of corner points of the m facets of every cell, cell by cell."""
         facets = self.shape.facets
         return self.corners[:, facets].reshape(-1, facets.shape[1])
 

@@ -19,8 +19,8 @@ READ = (".3mf", ".dae", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
 def loaded_skin(path: Path, scale: Sequence[float], d: Array, C: Array) -> "trimesh.Trimesh":
     """Read the mesh in `path`, turned by C (3, 3) and moved by d (3,), m.
 
-    Coordinates times `scale` (3,) are in m, or in the file's unit. Raises `ModuleNotFoundError` without trimesh,
-    `InputError` if the file is missing, damaged or of another format.
+    `scale` (3,): m per unit of its coordinates, in m already where it names a unit. Raises `ModuleNotFoundError`
+    without trimesh, `InputError` if the file is missing, damaged or of another format.
     """
     import trimesh
 

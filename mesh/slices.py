@@ -29,8 +29,8 @@ IN_PLANE = 1e-9
 class SectionQuadrature:
     """Quadrature, by q points, on the part of a cross section that lies in this process's cells."""
 
-    cells: Integers  # (q,) local cell of each point
-    X: Array  # (q, 3) reference coordinates of the points in these cells
+    cells: Integers  # (q,) number of each point's local cell
+    X: Array  # (q, 3) reference coordinates of the points in these cells, no unit
     weights: Array  # (q,) in m²; their sum over all processes is the area of the section
     points: Array  # (q, 3) in m
     y_range: tuple[float, float]  # smallest and largest y of the section, in m; (inf, −inf) where no cell is cut

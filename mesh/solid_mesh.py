@@ -36,11 +36,11 @@ class Surface:
     edges: Integers  # (e, 2) rows of `points`: the borders of the facets, of which triangles may be a finer division
     rows: Integers  # (k,) numbers of the points that this process evaluates; each belongs to one process
     cells: Integers  # (k,) local cell of each of these points
-    X: Array  # (k, 3) their reference coordinates in it
+    X: Array  # (k, 3) their reference coordinates in it, no unit
 
 
 def boundary(mesh: Mesh) -> tuple[Integers, Integers, Integers]:
-    """Return the boundary facets (b,) of this process, ascending, their cells (b,) and local numbers in them (b,)."""
+    """Return the b boundary facets (b,) of this process, ascending, their cells (b,) and local numbers in them (b,)."""
     mesh.topology.create_connectivity(2, 3)
     mesh.topology.create_connectivity(3, 2)
     facets = np.sort(np.asarray(exterior_facet_indices(mesh.topology), dtype=np.int64))
@@ -51,7 +51,7 @@ def boundary(mesh: Mesh) -> tuple[Integers, Integers, Integers]:
 
 
 def reference_facets(mesh: Mesh) -> Integers:
-    """Return corners (m, 3 or 4) of each facet of the reference cell, in dolfinx's order."""
+    """Return numbers (m, 3 or 4) of the corners of the reference cell's m facets, in dolfinx's order."""
     return np.array(basix.topology(coordinate_element(mesh).cell_type)[2])
 
 

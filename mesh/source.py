@@ -46,7 +46,7 @@ class RawMesh:
     """Mesh as read from a source, in its unit of length; readers add elements block by block."""
 
     points: Array  # (p, 3) in the source's unit and axes; some may belong to no volume
-    # name → (k,) points: a face is what has all its corners among them
+    # name → numbers (k,) of points: a face is what has all its corners among them
     point_groups: Mapping[str, Integers] = field(default_factory=dict)
     blocks: list[tuple[str, Integers]] = field(default_factory=list)  # of volume elements: type, (c, v) points
     # name → arrays (k,) of elements, counted through all `blocks`; an element may belong to several
@@ -58,7 +58,7 @@ class RawMesh:
     masses: Sequence[PointMass] = ()  # concentrated ones, which the link does not have either
 
     def add_solids(self, kind: str, cells: Integers, groups: Groups) -> None:
-        """Add volume elements (c, v) of meshio's type `kind`, nodes in gmsh's order, and the groups among them."""
+        """Add c volume elements (c, v) of meshio's type `kind`, nodes in gmsh's order, and the groups among them."""
         count = sum(len(block) for _, block in self.blocks)
         self.blocks.append((kind, cells))
         for name, members in groups:

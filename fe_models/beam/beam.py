@@ -30,12 +30,12 @@ Bending = tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, sp.csr_matrix, sp.c
 
 @struct
 class FamilyModel:
-    """One family's eigenproblem K x = ω² M x over its m free degrees of freedom."""
+    """One family's eigenproblem K x = ω² M x, SI units, over its m free degrees of freedom."""
 
     # K, M: (m, m)
     K: sp.csr_matrix
     M: sp.csr_matrix
-    strain: sp.csr_matrix  # (s, m) the strains at Gauss points, scaled such that K = strainᵀ strain
+    strain: sp.csr_matrix  # (s, m) s strains at Gauss points, scaled such that K = strainᵀ strain
     # for each component U_X … R_Z that the family moves, (k, m): translation or rotation at k stations from x
     fields: Mapping[int, sp.csr_matrix]
 
@@ -115,7 +115,7 @@ class BeamForms:
         by: Functions | None = None,
         derivative_by: int | None = None,
     ) -> sp.csr_matrix:
-        """Return ∫ weight f⁽ᵈ⁾ g⁽ᵈ⁾ dx, x in m, for weights (e,) of elements: test functions f `of`, trial ones g `by`.
+        """Return ∫ weight f⁽ᵈ⁾ g⁽ᵈ⁾ dx, x in m, for weights (e,), any unit: test functions f `of`, trial ones g `by`.
 
         By default g = f, and both derivatives d are `derivative`.
         """

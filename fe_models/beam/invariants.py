@@ -22,7 +22,7 @@ from .sections import cellwise
 
 
 def shape_integrals(link: BeamLink, stations: Functions, fields: Array) -> Invariants:
-    """Inertia shape integrals (docs/theory.md) over the volume; `fields` (6, k, n) U_X … R_Z (m, rad) at k stations.
+    """Inertia shape integrals (docs/theory.md) over the volume; `fields` (6, k, n): U_X … R_Z, m and rad, of n modes.
 
     With displacement (u, v, w) and rotation (φ, θ_y, θ_z) of the section, a point (x, y, z) moves by Φ0 + y Φy + z Φz,
     Φ0 = (u, v, w), Φy = (−θ_z, 0, φ), Φz = (θ_y, −φ, 0); principal axes leave ∫y = ∫z = ∫yz = 0.
@@ -87,8 +87,8 @@ POINTS = 5  # Gauss points of an element: exact, since of cubics no product is o
 def geometric_stiffness(link: BeamLink, stations: Functions, fields: Array, interfaces: dict[str, float]) -> Array:
     """Geometric stiffness (l, n, n), rad²/s² per unit of load, of the `unit_loads` under the reference condition.
 
-    `fields` (6, k, n) are rows U_X … R_Z at k stations; every interface, at its m from the root, is a vertex of their
-    mesh. Euler–Bernoulli links are a line of mass: their spin inertia has no second-order motion.
+    `fields` (6, k, n): U_X … R_Z, m and rad, of n modes at k stations; every interface, at its m from the root, is a
+    vertex of their mesh. The spin inertia of Euler–Bernoulli links has no second-order motion.
     """
     x, weight, values, slopes = _at_gauss_points(stations, fields)
     forces = section_forces(link, x, interfaces, ROTARY if link.model.theory == "timoshenko" else {})
@@ -124,10 +124,10 @@ def _products(values: Array, slopes: Array) -> Array:
 
 
 def section_forces(link: BeamLink, x: Array, interfaces: Mapping[str, float], rotary: Rotary) -> Array:
-    """Force, N, and moment, N·m (6, l, g), at x (g,), m, by unit load on the straight link in its reference condition.
+    """Force, N, and moment, N·m (6, l, g), at x (g,), m, by each of l unit loads on the straight link.
 
-    `interfaces`: m from the root; loads at the tip act on the section there, too. `rotary`: `ROTARY`, {} without rotary
-    inertia.
+    The link is in its reference condition. `interfaces`: m from the root; loads at the tip act on the section there,
+    too. `rotary`: `ROTARY`, {} without rotary inertia.
     """
     of_inertia, length, units = _of_inertia(link, np.append(x, 0.0), rotary), link.geometry.length, np.eye(6)[..., None]
     forces, at_root = [of_inertia[..., :-1]], [of_inertia[..., -1:]]
@@ -140,7 +140,7 @@ def section_forces(link: BeamLink, x: Array, interfaces: Mapping[str, float], ro
 
 
 def of_load(load: Array, arm: Array) -> Array:
-    """Return force, N, and moment, N·m (6, …, g), of `load` (6, …, 1 or g) that acts `arm` (g,), m, further along x."""
+    """Return force, N, and moment, N·m (6, …, g), of such a `load` (6, …, 1 or g) `arm` (g,), m, further along x."""
     force, moment = load[:3] * np.ones_like(arm), load[3:]
     return np.concatenate([force, moment + _lever(force * arm)])
 

@@ -23,7 +23,7 @@ class Functions:
     nodes: Array  # (e + 1,) ascending, in m
     x: Array  # (size,) where the degrees of freedom are, ascending, in m
     element: Integers  # (e, d) degrees of freedom of each element, numbered along the axis
-    powers: Array  # (p, d) coefficients of the powers of X ∈ [0, 1] in each shape function
+    powers: Array  # (p, d) coefficients, no unit, of the powers of X ∈ [0, 1] in each shape function
     slopes: Integers  # (d,) 1 of degrees of freedom that are derivatives by x, else 0
 
     @property
@@ -37,7 +37,7 @@ class Functions:
         return np.diff(self.nodes)
 
     def at(self, x: Array, derivative: int = 0) -> sp.csr_matrix:
-        """Return the matrix (k, size) of values, or of the given `derivative` by x, at points x (k,), m."""
+        """Return the matrix (k, size) of values, no unit, or of a `derivative` by x, 1/m, at points x (k,), m."""
         cell = np.clip(np.searchsorted(self.nodes, x, side="right") - 1, 0, len(self.element) - 1)
         return self._within(cell, (x - self.nodes[cell]) / self.lengths[cell], derivative)
 
@@ -63,7 +63,7 @@ class Functions:
 
 
 def gram(B: sp.csr_matrix) -> sp.csr_matrix:
-    """BᵀB (m, m) of B (4e, m), made of `Functions.root`.
+    """BᵀB (m, m) of B (4e, m), any unit, made of `Functions.root`.
 
     The sum goes Gauss point by Gauss point: contributions of neighboring elements are then rounded alike and cancel in
     rigid motions.

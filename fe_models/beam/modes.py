@@ -25,7 +25,7 @@ REFINEMENTS = 3
 
 
 class Mode(NamedTuple):
-    """One mode: ω² in rad²/s², its family, and x (m,), the degrees of freedom of that family's model, xᵀMx = 1."""
+    """One mode: ω² in rad²/s², its family, and x (m,), SI, xᵀMx = 1, the degrees of freedom of that family's model."""
 
     omega2: float
     family: Family
@@ -33,7 +33,7 @@ class Mode(NamedTuple):
 
 
 def modes_of(family: Family, omega2: Array, X: Array) -> list[Mode]:
-    """Modes of a family, one by one, from ω² (n,) in rad²/s² and degrees of freedom X (m, n)."""
+    """Modes of a family, one by one, from ω² (n,) in rad²/s² and degrees of freedom X (m, n), XᵀMX = I."""
     return [Mode(float(square), family, x) for square, x in zip(omega2, X.T, strict=True)]
 
 
@@ -62,7 +62,7 @@ class BeamFlexibility:
 def attachment_modes(
     model: FamilyModel, family: Family, X: Array, places: Sequence[int], length: float, twists_along: bool
 ) -> list[Mode]:
-    """Attachment modes of a family, M-orthogonal to its eigenmodes X (m, n) in the modal body.
+    """Attachment modes of a family, M-orthogonal to its eigenmodes X (m, n), XᵀMX = I, in the modal body.
 
     `places` are the stations of the interfaces, `length` (m) is that of the link: loads are unit forces, and moments
     of 1 N times it. `twists_along`: whether to add a torque distributed along the link, as on bent links.
@@ -86,7 +86,7 @@ def attachment_modes(
 
 
 def ritz_modes(model: FamilyModel, family: Family, fixed: Array, static: Array) -> tuple[list[Mode], list[Mode]]:
-    """Ritz modes in the space of fixed-interface modes (m, n) and static shapes (m, r), M-orthonormal together.
+    """Ritz modes in the space of fixed-interface modes (m, n) and static shapes (m, r), XᵀMX = I of all.
 
     Returns the n that count as eigenmodes, and the r others, of the highest frequencies.
     """

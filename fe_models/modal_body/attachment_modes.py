@@ -41,7 +41,7 @@ def moving(families: Container[str]) -> list[int]:
 class Inertia:
     """M and strain energy of a finite element model with m degrees of freedom, of which a process may own a part.
 
-    `mass` returns M U of displacements U (m, k), `energy` UᵀKU (k, k), `total` the sum of an array over all processes.
+    `mass` returns M U of displacements U (m, k), SI, `energy` UᵀKU (k, k), J, `total` the sum over all processes.
     """
 
     mass: Callable[[Array], Array]
@@ -49,7 +49,7 @@ class Inertia:
     total: Callable[[Array], Array]
 
     def without(self, X: Array, U: Array) -> Array:
-        """Return U (m, k) M-orthogonal to X (m, n), XᵀMX = I, to round-off."""
+        """Return U (m, k), any unit, M-orthogonal to X (m, n), XᵀMX = I, to round-off."""
         for _ in range(2):
             U = U - X @ self.total(X.T @ self.mass(U))
         return U
@@ -70,7 +70,7 @@ class ModeSet:
 
 
 def residual_modes(static: Mapping[Family, tuple[Array, Array]], X: Array, highest: float, inertia: Inertia) -> ModeSet:
-    """Attachment modes from `static`: by family the shapes K⁻¹B and the loads B, both (m, loads).
+    """Attachment modes from `static`: by family the shapes K⁻¹B and the loads B, both (m, loads), SI.
 
     B are unit forces, and moments of these times a length; X (m, n) are the eigenmodes, XᵀMX = I, `highest` their
     highest ω² in rad²/s², inf without any.
@@ -121,7 +121,7 @@ def ascending(omega2: Array, family: Integers) -> Integers:
 
 
 def uncoupled(K: Array, of: Integers) -> tuple[Array, Array, Integers]:
-    """Eigenvalues (n,), eigenvectors (n, n), families (n,) of K (n, n), rad²/s²; `of` (n,): families of its rows."""
+    """Eigenvalues (n,), unit eigenvectors (n, n), families (n,) of K (n, n), rad²/s²; `of` (n,): families of its rows."""
     apart = of[:, None] != of
     size = np.sqrt(np.diag(K))
     if np.any(np.abs(K)[apart] > (COUPLED * np.outer(size, size))[apart]):

@@ -237,7 +237,7 @@ def _inertia(body: ModalBody) -> Iterator[str]:
 
 
 def moving_along(body: Integrals, S_spin: Array | None) -> Array:
-    """∫ρ φ_kᵀφ_k dV (3, n, n) along each axis k, less the mean φ_k: positive of modes φ of mass that exists."""
+    """∫ρ φ_kᵀφ_k dV (3, n, n), no unit, along each axis k, less the mean φ_k: positive where mass exists."""
     S = body.S_bar
     each = np.einsum("kkab->kab", body.S_bar_kl) - np.einsum("ka,kb->kab", S, S) / body.mass
     each[2] -= 0.0 if S_spin is None else S_spin

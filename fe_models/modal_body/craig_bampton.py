@@ -47,7 +47,7 @@ ALONE = 1e-12  # eigenvalues of flexibility, each scaled to 1: less is of interf
 
 
 class FixedInterfaceFlexibility:
-    """F − F Bᵀ (B F Bᵀ)⁻¹ B F: displacements u under loads with interfaces fixed, B u = 0, B (k, m) the `rows`.
+    """F − F Bᵀ (B F Bᵀ)⁻¹ B F: displacements u, m, under loads with interfaces fixed, B u = 0, B (k, m) the `rows`.
 
     F is the `flexibility`, of a `rank`, under the supports of the root. Of vectors that several processes share, each
     has its own m entries; `total` sums an array over the processes.
@@ -69,7 +69,7 @@ class FixedInterfaceFlexibility:
 
 @struct
 class InterfaceCoordinates:
-    """Interface coordinates d, m and rad, by modal coordinates p of the floating frame."""
+    """Interface coordinates d, m and rad, by n modal coordinates p, m·√kg, of the floating frame; SI units."""
 
     names: list[str]  # of the c coordinates d: "tip/y" … "tip/rz", of interfaces other than the root
     rows: Array  # (c, n) d = rows p
@@ -127,7 +127,7 @@ def interface_coordinates(
 def interface_loads(
     omega2: Array, families: Sequence[str], static: int, interfaces: Mapping[str, Interface]
 ) -> tuple[Array, dict[str, Array]]:
-    """W (n, n), rad²/s², and by interface c (6, n), N and N·m: K X = M X W + B c for the n modes X of a link.
+    """W (n, n), rad²/s², and by interface c (6, n), N and N·m per mode: K X = M X W + B c for the n modes X of a link.
 
     B are unit loads at interfaces. `omega2` (n,) is ω², rad²/s², `static` the number of static shapes.
     """

@@ -98,7 +98,7 @@ def attached_integrals(m: float, x: Array, E: Array, Phi: Array, phi: Array) -> 
 
 
 def loads_with_lumps(names: Sequence[str], attached: Iterable[Lump]) -> Array:
-    """T (l, l): under unit load k of `names` a link with lumps bears the unit loads T[:, k] of the bare link.
+    """T (l, l), SI: under unit load k of l `names` a link with lumps bears the unit loads T[:, k] of the bare link.
 
     A lump loads the link by its inertia force and moment at its interface, which are among the loads themselves.
     """
@@ -112,7 +112,7 @@ def loads_with_lumps(names: Sequence[str], attached: Iterable[Lump]) -> Array:
 def with_lumped_stiffness(matrices: Array, names: Sequence[str], attached: Sequence[Lump]) -> dict[str, Array]:
     """Geometric stiffness (n, n), rad²/s² per unit of load, by unit load, with lumps: their inertia and turning.
 
-    `matrices` (l, n, n) are those without lumps.
+    `matrices` (l, n, n), likewise, are those without lumps.
     """
     total = np.tensordot(loads_with_lumps(names, attached).T, matrices, axes=1)
     for lump in attached:
@@ -122,9 +122,10 @@ def with_lumped_stiffness(matrices: Array, names: Sequence[str], attached: Seque
 
 
 def of_turning(E: Array, products: Array) -> Array:
-    """Geometric stiffness (9, n, n) of the loads r_x … omega_yz: d'Alembert's on a rigid body that turns.
+    """Geometric stiffness (9, n, n), rad²/s² per unit of load, r_x … omega_yz: d'Alembert's on a rigid body that turns.
 
-    E (3, 3) is ∫ρ d dᵀ dV, kg·m², of d from its center; `products` (3, 3, n, n) are φ_a φ_b of its rotation φ, rad.
+    E (3, 3): ∫ρ d dᵀ dV, kg·m², of d from its center; `products` (3, 3, n, n): φ_a φ_b of its rotation φ, rad per
+    unit of n modes.
     """
     # To second order d moves by ½ φ × (φ × d) besides φ × d; of −φ × (φ × d) = pᵀG p are K_x,kl = ∫ρ d_k G_l dV, and
     # from them K_ω = 1 tr K_x − sym K_x and K_r,a = ε_abc K_x,bc (docs/theory.md).

@@ -29,7 +29,7 @@ def modal_body_of(
 ) -> ModalBody:
     """The modal body of `link`, its hashes left empty, of so many `eigenmodes`, then attachment modes, ω² (n,) rad²/s².
 
-    `integrals` and `geometric_stiffness` (l, n, n), by unit load, are those of the link without the `attached` lumps;
+    `integrals` and `geometric_stiffness` (l, n, n), rad²/s² by unit load, are those without the `attached` lumps;
     `others` are further fields.
     """
     omega = np.sqrt(omega2)

@@ -24,7 +24,7 @@ class Integrals:
         second_moment: (3, 3) ∫ρ x xᵀ dV in kg·m².
         S_bar: (3, n) ∫ρ Φ dV in √kg.
         I_bar: (3, 3, n) ∫ρ x_k Φ_l dV at [k, l] in m·√kg.
-        S_bar_kl: (3, 3, n, n) ∫ρ Φ_kᵀ Φ_l dV at [k, l].
+        S_bar_kl: (3, 3, n, n) ∫ρ Φ_kᵀ Φ_l dV at [k, l], no unit.
     """
 
     mass: float
@@ -130,7 +130,7 @@ class StressPoint(Frozen):
 
     position: Array  # (3,) in m, undeformed
     stress: Array  # (6, n) in Pa per unit of modal coordinate
-    # (6, n) per unit of modal coordinate; shear strains are 2ε_yz, 2ε_xz, 2ε_xy, so that stress = C strain
+    # (6, n), no unit, per unit of modal coordinate; shear strains are 2ε_yz, 2ε_xz, 2ε_xy, so that stress = C strain
     strain: Array
     # (6, l) in Pa per unit of each load in `ModalBody.stress_loads`, of the link under its reference condition; None
     # where not known

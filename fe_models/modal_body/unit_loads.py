@@ -61,7 +61,7 @@ def work_on_modes(
 ) -> dict[str, Array]:
     """Return modal forces Φᵀb (n,), N/√kg, of each unit load b, from invariants of a link and modes at interfaces.
 
-    `h_spin` (n,): ∫ρI_p φ dx of a line of mass with twist φ, not in `I_bar`.
+    `h_spin` (n,), m·√kg: ∫ρI_p φ dx of a line of mass with twist φ, not in `I_bar`.
     """
     cross = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}
     work = dict[str, Array]()

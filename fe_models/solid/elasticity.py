@@ -29,7 +29,7 @@ AnyMaterial = Material | OrthotropicMaterial
 class MaterialMap:
     """Material of each cell of this rank, ghosts included."""
 
-    C: Array  # (r, 6, 6) stiffness of each material, as in `constitutive.stiffness`
+    C: Array  # (r, 6, 6) Pa, stiffness of each of r materials, as in `constitutive.stiffness`
     density: Array  # (r,) in kg/m³
     of_cell: Integers  # (c,) row of `C` and `density`
 

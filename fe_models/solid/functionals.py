@@ -27,7 +27,7 @@ from .elasticity import SolidModel
 
 @struct
 class Averages:
-    """Mean motion of k plane figures: faces, or cross sections."""
+    """Mean motion of k plane figures: faces, or cross sections; SI units."""
 
     # (4k, owned + ghosts) this rank's part of ∫N_a ds, ∫x N_a ds, ∫y N_a ds, ∫z N_a ds of each figure
     weights: sp.csr_matrix
@@ -40,7 +40,7 @@ class Averages:
     density: Array  # (k,) mean density in kg/m³
 
     def of(self, model: SolidModel, modes: Array) -> tuple[Array, Array]:
-        """Return mean translation, m, and rotation, rad, (k, 3, n) each, of `modes` (3 owned, n); collective."""
+        """Return mean translation, m, and rotation, rad, (k, 3, n) each, of `modes` (3 owned, n), m; collective."""
         n = modes.shape[1]
         moments = model.total(self.weights @ model.with_ghosts(modes).reshape(-1, 3 * n)).reshape(-1, 4, 3, n)
         translation = moments[:, 0] / self.area[:, None, None]
@@ -144,7 +144,7 @@ def outlined_patches(
     1/(1 − ν) times as large.
 
     `faces` has the tags, among `facet_tags`, of "patch/K/top" and "patch/K/bottom", K from 0; `length` (m) is that of
-    the link, `modes` (3 (owned + ghosts), n).
+    the link, `modes` (3 (owned + ghosts), n), 1/√kg.
     """
     edges, mesh, v = record.edges(length), space.mesh, ufl.TestFunction(space)
     forces: dict[str, Array] = {}

@@ -23,7 +23,7 @@ from .supports import Flexibility
 
 
 def shape_integrals(model: SolidModel, modes: Array) -> Invariants:
-    """Return the integrals, SI units, of the part alone, of `modes` (3 owned, n); its spin inertia is 0; collective."""
+    """Return the integrals, SI, of the part alone for `modes` (3 owned, n), 1/√kg; no spin inertia; collective."""
     n, x = modes.shape[1], model.x
     Phi = modes.reshape(-1, 3, n)
     M_Phi = (model.mass @ modes).reshape(-1, 3, n)
@@ -48,7 +48,7 @@ def unit_loads(model: SolidModel, interfaces: Mapping[str, Array]) -> Array:
     """Return consistent nodal forces (3 owned, l), N per unit, of the l unit loads of a link; collective.
 
     They are d'Alembert forces, and forces and moments at `interfaces`, spread by the transpose of their mean motion B
-    (6, 3 owned): see `modal_body.unit_loads`.
+    (6, 3 owned), m and rad per m: see `modal_body.unit_loads`.
     """
     wrenches = inertia_wrenches(model.x, np.ones(len(model.x)), np.zeros_like(model.x))
     return np.hstack([model.mass @ wrenches[:, :3].reshape(-1, MOTIONS), *(B.T for B in interfaces.values())])
@@ -71,7 +71,7 @@ def prestressed(
     interfaces: Mapping[str, Interface],
     supports: Mapping[str, Sequence[int]],
 ) -> Array:
-    """Geometric stiffness (l, n, n), rad²/s² per unit of load, of `modes` (3 owned, n) by unit load; collective.
+    """Geometric stiffness (l, n, n), rad²/s² per unit of load, of `modes` (3 owned, n), 1/√kg; collective.
 
     Forces act at centers of interfaces, moments on their rotation vectors. `loads` and `shapes` (3 owned, l) are nodal
     forces, N, and displacements, m, of unit loads, `rows` B (6, 3 owned) the mean motion of each interface; Bᵀ

@@ -149,10 +149,10 @@ def names(motion: Sequence[Array]) -> list[str]:
 
 
 def aligned(omega2: Array, motion: Sequence[Array], wanted: Sequence[str] | str) -> Array:
-    """Return Q (n, n), orthogonal, that rotates modes of equal frequency to the families: a reproducible basis.
+    """Return rotations Q (n, n), no unit, of modes of equal frequency to the families: a reproducible basis.
 
-    `omega2` (n,) in rad²/s² is ascending, `motion` (rows, n) that of the sections by family. For `wanted` families (not
-    "all") modes of nearly equal frequency are combined, too: all motion in a family is then in one of them.
+    `omega2` (n,) in rad²/s² is ascending, `motion` (rows, n), m·√kg, that of the sections by family. For `wanted`
+    families (not "all") modes of nearly equal frequency are combined, too: all motion in a family is then in one.
     """
     Q = np.eye(omega2.size)
     gap = REPEATED if wanted == "all" else NEARLY

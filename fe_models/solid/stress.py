@@ -37,7 +37,7 @@ NEWTON_STEPS = 10
 def modal_strains(space: FunctionSpace, cells: Integers, X: Array, modes: Array) -> Array:
     """Return strains (q, 6, n) ε_xx, ε_yy, ε_zz, 2ε_yz, 2ε_xz, 2ε_xy of modes, per unit of each, at points of cells.
 
-    `cells` (q,) of this process, X (q, 3) reference coordinates in them, `modes` (3 (owned + ghosts), n).
+    `cells` (q,) of this process, X (q, 3) reference coordinates in them, `modes` (3 (owned + ghosts), n), 1/√kg.
     """
     element, nodes = lagrange_element(space), node_map(space)
     n = modes.shape[1]
@@ -59,7 +59,7 @@ def _symmetric(gradient: Array) -> Array:
 
 
 def jacobians(mesh: Mesh, cells: Integers, X: Array) -> Array:
-    """Return J (q, 3, 3) = ∂x/∂X, m, at reference coordinates X (q, 3), one point in each of `cells` (q,)."""
+    """Return J (q, 3, 3) = ∂x/∂X, m, at reference coordinates X (q, 3), no unit, one point in each of `cells` (q,)."""
     shapes = coordinate_element(mesh).tabulate(1, X)[1:, :, :, 0]
     corners = mesh.geometry.x[geometry_nodes(mesh)[cells]]
     return np.einsum("kqv,qvi->qik", shapes, corners)
@@ -68,8 +68,8 @@ def jacobians(mesh: Mesh, cells: Integers, X: Array) -> Array:
 def locate(mesh: Mesh, points: Array, slack: float) -> tuple[Integers, Integers, Array]:
     """Find the cells owned by this process that contain `points` (k, 3), m, a point in none, one or several.
 
-    Returns for each of h hits the number of the point (h,), the cell (h,) and reference coordinates X (h, 3). `slack`
-    is how far outside its cell a point may be, in X. Curved cells are inverted by Newton's method.
+    Returns for each of h hits the number of the point (h,), the cell (h,) and reference coordinates X (h, 3), no unit.
+    `slack` is how far outside its cell a point may be, in X. Curved cells are inverted by Newton's method.
     """
     owned = mesh.topology.index_map(3).size_local
     corners = mesh.geometry.x[geometry_nodes(mesh)]
@@ -91,7 +91,7 @@ def locate(mesh: Mesh, points: Array, slack: float) -> tuple[Integers, Integers,
 
 
 def pulled_back(mesh: Mesh, cells: Integers, points: Array) -> Array:
-    """Return reference coordinates (q, 3) of `points` (q, 3), m, in `cells` (q,); NaN if none, far outside cells."""
+    """Return reference coordinates (q, 3), no unit, of `points` (q, 3), m, in `cells` (q,); NaN far outside cells."""
     element = coordinate_element(mesh)
     corners = mesh.geometry.x[geometry_nodes(mesh)[cells]]
     X = np.full_like(points, 0.25)
@@ -140,7 +140,7 @@ def point_stresses(
     """Modal stresses and strains at named points, m.
 
     C (6, 6), or (cells, 6, 6) for the cells of this process, in Pa, as in `constitutive.stiffness`; `modes` (3 (owned +
-    ghosts), n). Raises `InputError` for a point outside the part, on every process.
+    ghosts), n), 1/√kg. Raises `InputError` for a point outside the part, on every process.
     """
     positions = np.array(list(points.values()), dtype=np.float64).reshape(-1, 3)
     count, strain, stress = _averages(space, C, modes, positions)
@@ -158,7 +158,7 @@ def point_stresses(
 def surface_stresses(space: FunctionSpace, C: Array, modes: Array, points: Array) -> Array:
     """Return modal stresses (p, 6, n), Pa/(m·√kg), at `points` (p, 3), m, of the picture mesh; equal on all processes.
 
-    Raises `ValueError` for a point that is not on the mesh.
+    C and `modes` are as in `point_stresses`. Raises `ValueError` for a point that is not on the mesh.
     """
     count, _, stress = _averages(space, C, modes, points)
     if not np.all(count):
@@ -210,9 +210,9 @@ class Gradients:
 
     cells: slice  # which of this rank's own
     weights: Array  # (c, q) quadrature weight times volume in m³
-    values: Array  # (c, 3, q, 3, k): ∂u_i/∂x_j at [:, j, :, i]
-    inverse: Array  # (c, 1 or q, 3, 3) ∂X_a/∂x_j at [:, :, j, a]
-    shapes: Array  # (3, q, d) slopes of the d shape functions on the reference cell
+    values: Array  # (c, 3, q, 3, k), no unit: ∂u_i/∂x_j at [:, j, :, i]
+    inverse: Array  # (c, 1 or q, 3, 3) 1/m, ∂X_a/∂x_j at [:, :, j, a]
+    shapes: Array  # (3, q, d) slopes of the d shape functions on the reference cell, no unit
 
     def forces(self, stress: Array) -> Array:
         """Return ∫ σ : ∇N_a dV (c, d, 3, k), N, at nodes of each cell, of stresses (c, 6, q, k) times weights, N·m."""
@@ -297,7 +297,7 @@ def geometric_stiffness(model: SolidModel, modes: Array, prestress: Array) -> Ar
     """Return ∫ σ_ab ∂_aΦ_i · ∂_bΦ_j dV (l, n, n), J, for the stresses σ of each of l displacement fields; collective.
 
     Second variation of the work of a stress σ on the quadratic part of Green's strain (Bathe, Finite Element
-    Procedures, §6.2.3): positive where tension stiffens. `modes` (3 owned, n) are Φ, `prestress` (3 owned, l) the
+    Procedures, §6.2.3): positive where tension stiffens. `modes` (3 owned, n), m, are Φ, `prestress` (3 owned, l) the
     displacements, m, that cause the stresses.
     """
     n, loads = modes.shape[1], prestress.shape[1]

@@ -129,7 +129,7 @@ class RigidFace:
 class Flexibility:
     """Flexibility F of the supported solid, `F @ loads`. Vectors hold this rank's own degrees of freedom.
 
-    `faces` are the rigid ones; B (6, 3 owned) rows of the mean supports, None where rigid faces support the body.
+    `faces` are the rigid ones; B (6, 3 owned) rows of the mean supports, SI, None where rigid faces support the body.
     Raises `SolveError` where the supported stiffness is not positive definite.
     """
 
