@@ -165,7 +165,7 @@ class PatchFeasibility:
     current_limit: Array  # (k,) A
     field: Array  # (k,) V/m in a layer at the required voltage
     limited_field: Array  # (k,) V/m at the voltage within the limit
-    strain: Array  # (k,) of the outer surface by bending of the link, mean along the patch
+    strain: Array  # (k,), no unit, of the outer surface by bending of the link, mean along the patch
     mode_required: Array  # (n,) N/√kg, largest modal force
     mode_available: Array  # (n,) N/√kg, modal force with every patch at its limit
     find_remedies: Callable[[], Remedies]
@@ -179,17 +179,17 @@ class PatchFeasibility:
 
     @property
     def factor(self) -> Array:
-        """Ratio (k,) of required to available torque, slew rate or current; the patch suffices up to 1."""
+        """Ratio (k,), no unit, of required to available torque, slew rate or current; up to 1 the patch suffices."""
         return np.maximum(self.required_moment / self.available_moment, self.rates)
 
     @property
     def rates(self) -> Array:
-        """Ratio (k,) of required to available slew rate or current, the larger one."""
+        """Ratio (k,), no unit, of required to available slew rate or current, the larger one."""
         return np.maximum(self.slew / self.slew_limit, self.current / self.current_limit)
 
     @property
     def mode_factor(self) -> Array:
-        """Ratio (n,) of required to available modal force; above 1 no voltages within limits suffice, even alone.
+        """Ratio (n,), no unit, of required to available modal force; above 1 no voltages within limits suffice.
 
         Infinite where no patch reaches the mode, 0 where no force is required.
         """

@@ -79,11 +79,11 @@ class PointSet:
 
     @property
     def direction(self) -> Array:
-        """Unit vectors (3, c) of the force components, body axes."""
+        """Unit vectors (3, c), no unit, of the c force components, body axes."""
         return np.eye(3)[:, [AXES.index(axis) for axis in self.axes]]
 
     def of_core(self) -> tuple[Array, Array, Array, Array]:
-        """Return directions (3, c), positions (3, c), m, shapes (3 c, n), 1/√kg, and `scale` (6 + n,) for the core."""
+        """Return directions (3, c), positions (3, c), m, shapes (3 c, n), 1/√kg, `scale` (6 + n,), SI, for the core."""
         position = np.transpose([point.position for point in self.points])
         return self.direction, position, np.vstack([point.translation for point in self.points]), self.scale
 

@@ -24,7 +24,7 @@ from .sampled_model import SampledModel, riccati, sampled
 
 
 class Controller(Protocol):
-    """Protocol of controllers: u = controller(k, y) at each sample k; a controller may keep a state.
+    """Protocol of controllers: u (inputs,) = controller(k, y (outputs,)), SI, at sample k; it may keep a state.
 
     `bandwidth` (rad/s) is that of the fastest motion on which it acts; 0 where not known.
     """
@@ -232,10 +232,10 @@ MOST_STATES = 500  # with which the Riccati equation takes seconds, not minutes
 
 
 def gains(model: SampledModel, Q: Array, R: Array) -> Array:
-    """Return K (m, n) of u = −K x with least Σ xᵀQx + uᵀRu; Q (k, k) weights the first k states, the rest are delays.
+    """Return K (m, n) of u = −K x with least Σ xᵀQx + uᵀRu; Q (k, k) weights the first k states, others are delays.
 
-    Q and R (m, m) are diagonal, in inverse squares of the units of states and commands. Raises `ValueError` where the
-    Riccati equation has no stabilizing solution.
+    K is in units of u over x, Q and R (m, m), diagonal, in inverse squares of units of x and u. Raises `ValueError`
+    where the Riccati equation has no stabilizing solution.
     """
     n, waiting = len(Q), (len(model.A) - len(Q)) // len(R)
     # in the unit of what is acceptable: all weights are one

@@ -167,7 +167,7 @@ def state_space(
 ) -> LinearModel:
     """Return the state space of a linear mechanism with sensors.
 
-    `readings` are derivatives of outputs by s, ṡ, s̈ (f,) and voltages of patches (k,), SI units, by name of the output.
+    `readings`: derivatives of outputs by s, ṡ, s̈ (f,) and voltages of patches (k,), SI units, by name of the output.
     """
     f, inputs = len(mechanism.M), mechanism.inputs
     modal = {name: row for name, row in zip(mechanism.names, np.eye(f), strict=True) if name.startswith("modal/")}

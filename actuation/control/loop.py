@@ -181,13 +181,13 @@ class LoopRecord(Details):
     outputs: tuple[str, ...]
     time: Array  # (K,) s, of the samples taken
     readings: Array  # (K, outputs) in units of the sensors: rad, m, V and their rates
-    reference: Array  # (K, outputs) readings on the reference motion
+    reference: Array  # (K, outputs) readings on the reference motion, in the same units
     commands: Array  # (K, inputs) within limits, N·m, N or V
-    wanted: Array  # (K, inputs) before limits
+    wanted: Array  # (K, inputs) before limits, likewise
     tip_error_peak_time: float  # s, when the tip error is largest
     metrics: Metrics
     margins: Margins | None  # by the linear model; None where controllers, or the robot, are not linear
-    poles: ComplexArray | None  # eigenvalues (n,) of the linear loop at the start, from sample to sample
+    poles: ComplexArray | None  # eigenvalues (n,), no unit, of the linear loop at the start, from sample to sample
     warnings: tuple[str, ...]
     advice: tuple[str, ...] = ()  # what to try, a text each, where the loop is not stable
     # controllers as a linear law about the reference, by time (s): at the start, or along a schedule

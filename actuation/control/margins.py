@@ -147,7 +147,7 @@ def eigenvalue_count(loop: tuple[LinearModel, Feedback], T: float, delay: float)
 
 
 def loop_eigenvalues(model: LinearModel, feedback: Feedback, T: float, delay: float) -> ComplexArray:
-    """Return eigenvalues (n,), from sample to sample, of the loop with sample time T and `delay` of commands, s."""
+    """Return eigenvalues (n,), no unit, of the loop from sample to sample, T (s) apart; `delay` of commands, s."""
     late = None if feedback.late is None else tuple(map(tuple, feedback.late))
     plant, y = _plant(model, feedback.inputs, feedback.outputs, late, T, delay)
     F = np.block([[plant.A + plant.B @ feedback.D @ y, plant.B @ feedback.C], [feedback.B @ y, feedback.A]])

@@ -167,7 +167,7 @@ def slow_part(t: Array, values: Array, window: float) -> Array:
 
 
 def settling(t: Array, distance: Array) -> float:
-    """Return the time (s) from which `distance` (T,) at t (T,), s, stays below 5 % of its maximum; NaN if never."""
+    """Return the time (s) from which `distance` (T,), m, at t (T,), s, stays below 5 % of its maximum; NaN if never."""
     largest_error = float(distance.max())
     return _last_crossing(t, distance, SETTLED * largest_error) if largest_error > 0.0 else 0.0
 
@@ -189,7 +189,7 @@ def _last_crossing(t: Array, values: Array, level: float) -> float:
 
 
 def last_change(values_at: Callable[[Array], Array], time: Array) -> float:
-    """Return the time (s) at which `values_at` reaches its value at the end of `time` (T,), s."""
+    """Return the time (s) at which `values_at` (times (T,), s) reaches its value at the end of `time` (T,), s."""
     even, values = resting(values_at, time)
     way = np.linalg.norm(values - values[-1], axis=1)
     changing = np.flatnonzero(way > AT_REST * way.max(initial=0.0))

@@ -252,7 +252,7 @@ class Estimates:
     # mean of eᵀ Σ⁻¹ e over the number of axes, e the error of the position; 1 if the covariance Σ is right
     nees: float
     inside: float  # part of the errors within ±2σ, 0.95 if the covariance is right
-    poles: ComplexArray  # (n,) eigenvalues of the estimation error, from sample to sample, at the start
+    poles: ComplexArray  # (n,) eigenvalues, no unit, of the estimation error, from sample to sample, at the start
 
 
 class Observed:

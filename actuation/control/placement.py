@@ -46,7 +46,8 @@ class PatchableLink:
 
     array: PatchArray  # patches of the layout where the scene has them, on p
     bodies: tuple[str, ...]  # bodies with the modal coordinates of the link in linear models: itself, or its pieces
-    own: Array  # (m, n) p from the modal coordinates of the `bodies`, side by side, as linear models have them
+    # (m, n), no unit: p from the modal coordinates of the `bodies`, side by side, as linear models have them
+    own: Array
     # function of keys "count" or "centers"; raises `InputError` where patches do not fit the link
     patches: Callable[..., PatchArray]
 
@@ -72,7 +73,7 @@ class Placed(Details):
     best: Evaluation
     even: Evaluation
     frequency: Array  # (modes,) Hz, of the modes that count
-    share: Array  # (modes,) share of their strain energy that is in the link
+    share: Array  # (modes,) share, no unit, of their strain energy that is in the link
     largest_voltage: Array  # (2,) V of best and even over the path; nan without a path
     candidates: Array  # (k,) m, centers that were allowed
     candidate_reach: Array  # (modes, k) `Evaluation.reach` of a single patch there
@@ -83,7 +84,7 @@ class Placed(Details):
 def locked_modes(model: LinearModel, link: PatchableLink, count: int) -> tuple[Array, Array, Array]:
     """Return the lowest `count` modes of the robot, motors locked, in which the link bends.
 
-    Frequencies (modes,), Hz, shapes (modes, m) in the link's p, and the share (modes,) of strain energy in it.
+    Frequencies (modes,), Hz, shapes (modes, m), no unit, in the link's p, and its share (modes,) of strain energy.
     """
     f = model.freedom
     modal = [i for i, name in enumerate(model.state_names[:f]) if name.startswith("modal/")]

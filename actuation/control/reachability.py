@@ -15,7 +15,7 @@ OUT_OF_REACH = 1e-7  # of the largest effect that a unit input can have on a mod
 
 @struct
 class Reachability:
-    """Controllability or observability of each mode (f,), from 0 to 1, and names of the modes out of reach.
+    """Controllability or observability of each mode (f,), no unit, from 0 to 1, and names of the modes out of reach.
 
     1: a unit of the input that fits best drives nothing but this mode, in the mass metric. Modes of equal frequency are
     judged together, by the worst mixture of them: one input cannot reach two such modes.

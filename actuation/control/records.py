@@ -202,7 +202,7 @@ class ScheduledObserver(KalmanRecord):
 class GainsObserver(ObserverRecord):
     """x̂⁺ = A x̂ + B u + gain (y − C x̂) with given numbers, for the controller "state-feedback".
 
-    States are "state/1", …; y is in units of the readings times `scale`.
+    States are "state/1", …, in any units; y is in units of the readings times `scale`.
     """
 
     kind: Literal["gains"]

@@ -119,7 +119,7 @@ class Sensing:
 
 
 def readings_at(model: Model, mechanism: LinearMechanism, read: Sequence[Signal]) -> dict[str, Sequence[Any]]:
-    """Return derivatives of each reading by s, ṡ, s̈ (f,) of a linear mechanism of `model`, and by voltages, by name."""
+    """Return, by name, each reading's derivatives by s, ṡ, s̈ (f,) of the `mechanism` and by voltages (k,), SI."""
     rows = zip(read, *Sensing(model, read).rows(mechanism), strict=True)
     return {signal.name: (*slopes, signal.by_volts) for signal, *slopes in rows}
 

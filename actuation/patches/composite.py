@@ -122,7 +122,7 @@ def layers_on_link(placed: Sequence[PlacedLayout], body: ModalBody) -> LayersOnL
 
 
 def stiffness_ratios(placed: PlacedLayout, body: ModalBody) -> tuple[Array, Array]:
-    """Return the stiffness ratio ψ (k,) of link to patch, and the authority (k,); NaN without known rigidities.
+    """Return the stiffness ratio ψ (k,) of link to patch, and the authority (k,), no unit; NaN for unknown rigidities.
 
     ψ = E_b A_b / (E_p w N t_p), E_b t_b / (E_p t_p) at equal widths. The authority is the curvature (or twist) under a
     voltage, relative to c V/EI (c V/GJ), that of a link without the layers' stiffness.
@@ -228,7 +228,7 @@ class Effects(NamedTuple):
     # (k,) t_b, mean extent of the link along the normal under each patch, m: see `LinkSections.extent`
     extent: Array
     per_volt: Array  # (k,) c, load along the strain that each patch actuates, N·m/V
-    # (k,) strain of the surface per curvature and distance: 1; of diagonals per twist: β/2, see `place_of`
+    # (k,), no unit, strain of the surface per curvature and distance: 1; of diagonals per twist: β/2, see `place_of`
     lever: Array
     # (k, n) rotation of the sections at the ends of a patch against each other, in its sense, rad/(m·√kg)
     turn: Array

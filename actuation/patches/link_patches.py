@@ -43,7 +43,7 @@ WIDE = 3.0  # of its length: a link that wide keeps its sections flat, whatever 
 class OnBody:
     """Effects of all k patches of a link on one body that carries them, on the n modes of the body's file."""
 
-    to_link: Array  # (modes of the link, n) modal forces on the modes of the link's file by those on these modes
+    to_link: Array  # (modes of the link, n), no unit: modal forces on the modes of the link's file by those here
     charge: Array  # (n, k) of each patch per unit of each mode, C/(m·√kg): Φ_V, whether or not voltages drive it
     capacitance: Array  # (k, k) charges of patches as sensors by voltages, F
 
@@ -114,7 +114,7 @@ class LinkPatches:
 
     @property
     def to_reached(self) -> dict[str, Array]:
-        """Matrices (m, n) by body, from modal forces on the modes of its file to those on the modes of `reach`."""
+        """Matrices (m, n), no unit, by body, from modal forces on modes of its file to those on modes of `reach`."""
         return {name: self.reach.modes.forces(of.to_link.T).T for name, of in self.bodies.items()}
 
     def on_link(self, modal: Mapping[str, Array]) -> Array:

@@ -36,11 +36,11 @@ class ReachedModes:
     served: int  # number of the p', the first ones, that are no attachment modes
 
     def forces(self, F_p: Array) -> Array:
-        """Return modal forces (T, m), N/√kg, on p' from those (T, n) of the body; or other derivatives by modes."""
+        """Return modal forces (T, m) on p' from those (T, n) of the body, both N/√kg; or other derivatives by modes."""
         return F_p[:, self.rows] @ self.T
 
     def coordinates(self, p: Array) -> Array:
-        """Return p' (T, m), m·√kg, from modal coordinates of the modal body (T, n)."""
+        """Return p' (T, m) from modal coordinates (T, n) of the modal body, both m·√kg."""
         return np.linalg.lstsq(self.T, p[:, self.rows].T, rcond=None)[0].T
 
 
@@ -51,7 +51,7 @@ class Reach:
     modes: ReachedModes
     Phi_V: Array  # (n, k) modal forces per volt, N/(√kg·V)
     amplifiers: Amplifiers  # of the k patches
-    W_sqrt: Array  # (rows, n) weights: least squares minimize |W_sqrt r|² of the unmet modal forces r
+    W_sqrt: Array  # (rows, n) weights, no unit: least squares minimize |W_sqrt r|² of the unmet modal forces r
 
     @property
     def served(self) -> int:
@@ -82,7 +82,7 @@ class Reach:
 
 
 def served_first(served: int, n: int, patches: int) -> Array:
-    """Return roots of weights (rows, n) that prefer the first `served` of n modes.
+    """Return roots (rows, n), no unit, of weights that prefer the first `served` of n modes.
 
     Other modes have weights only if there are more `patches`.
     """
@@ -91,7 +91,7 @@ def served_first(served: int, n: int, patches: int) -> Array:
 
 
 def weights(layout: PztLayout, served: int, stiffness: Array, points: Mapping[str, Array]) -> Array:
-    """Return root weights W_sqrt (rows, n) of modes, or of deflections Φ(x) K⁻¹ r by unmet modal forces r at points.
+    """Return root weights W_sqrt (rows, n), no unit, of modes, or of deflections Φ(x) K⁻¹ r by unmet modal forces r.
 
     The first `served` of n modes have `stiffness` (n,), rad²/s², and at points by name Φ (components, n), 1/√kg. Raises
     `InputError` for weights that do not fit.
@@ -218,12 +218,12 @@ class PatchArray(Reach):
 
     @property
     def stiffness_ratio(self) -> Array:
-        """Axial stiffness of the link over that of each patch, ψ (k,)."""
+        """Axial stiffness of the link over that of each patch, ψ (k,), no unit."""
         return self._stiffness[0]
 
     @property
     def authority(self) -> Array:
-        """Curvature (or twist) under a voltage (k,), relative to that without the stiffness of the patches."""
+        """Curvature (or twist) (k,) under a voltage, relative to that without the stiffness of the patches, no unit."""
         return self._stiffness[1]
 
     @property

@@ -34,7 +34,7 @@ def section_property(link: BeamLink, x: Array, name: str) -> Array:
 
 
 def segments(link: BeamLink, x: Array) -> Integers:
-    """Number, from 0, of the segment at each x, m, of any shape; at a step of the section, of the one beyond it."""
+    """Numbers (…), from 0, of segments at x (…), m; at a step of the section, of the one beyond it."""
     return np.searchsorted(link.geometry.breakpoints[1:-1], x, side="right")
 
 

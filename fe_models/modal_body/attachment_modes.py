@@ -121,7 +121,7 @@ def ascending(omega2: Array, family: Integers) -> Integers:
 
 
 def uncoupled(K: Array, of: Integers) -> tuple[Array, Array, Integers]:
-    """Eigenvalues (n,), unit eigenvectors (n, n), families (n,) of K (n, n), rad²/s²; `of` (n,): families of its rows."""
+    """Eigenvalues (n,), unit eigenvectors (n, n), families (n,) of K (n, n), rad²/s²; `of` (n,): its rows' families."""
     apart = of[:, None] != of
     size = np.sqrt(np.diag(K))
     if np.any(np.abs(K)[apart] > (COUPLED * np.outer(size, size))[apart]):

@@ -78,7 +78,7 @@ class ModalBody(Integrals, Frozen):
         stress_loads: names of the l unit loads (`unit_loads`) whose static stresses are known; none in old files.
         surface_static: (p, 6, l) likewise, as `static` in `StressPoint`.
         surface_patches: modal forces of patches outlined in the mesh; None where there are none.
-        measured: marks of measured frequencies and damping ratios; None if all are computed.
+        measured: marks of measured frequencies and damping ratios; None: all computed.
         input_hash: of the link file's content.
         modes_hash: of that part of it on which the modes depend; empty where not known.
         ffrobot_version: that made it.

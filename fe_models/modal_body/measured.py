@@ -70,7 +70,7 @@ def _with_frequency(body: ModalBody, frequency: Array) -> ModalBody:
 
 
 def damping_ratio(link: Link, omega: Array) -> Array:
-    """Return ζ (n,) as given, or of Rayleigh damping D = aM + bK: a/(2ω) + bω/2; `omega` (n,) is ω in rad/s.
+    """Return ζ (n,), no unit, as given, or of Rayleigh damping D = aM + bK: a/(2ω) + bω/2; `omega` (n,) is ω in rad/s.
 
     A list is for the eigenmodes: its last number is that of the attachment modes, too.
     """

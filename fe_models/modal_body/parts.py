@@ -169,7 +169,7 @@ class OutlinedPatches(Frozen):
 
 
 class AlongAxis(NamedTuple):
-    """Modes at q points of the axis: `position` (q, 3), m; `translation`, `rotation` (q, 3, n) as in `Interface`."""
+    """Modes at q points of the axis: `position` (q, 3), m; `translation`, m, `rotation`, rad per mode (q, 3, n)."""
 
     position: Array
     translation: Array

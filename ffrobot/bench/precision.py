@@ -72,7 +72,7 @@ def error_columns(error: Mapping[str, float]) -> dict[str, float | None]:
 
 
 def relative(values: Array, reference: Array) -> float:
-    """Return the largest difference of histories (T, …) over the peak of `reference`, dimensionless."""
+    """Return the largest difference of histories (T, …), any unit, over the peak of `reference`, dimensionless."""
     return float(np.abs(values - reference).max() / np.abs(reference).max())
 
 

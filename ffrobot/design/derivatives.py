@@ -40,7 +40,7 @@ def weights(offsets: Array) -> Array:
 
 
 def derivative(offsets: Array, values: Array) -> Derivative:
-    """Return the derivative at 0 from `values` (n,), in any unit, at `offsets` (n,); NaN values are omitted.
+    """Return the derivative at 0 from `values` (n,), at `offsets` (n,), both in any unit; NaN values are omitted.
 
     Steps are taken two and three sizes at a time; those with the least estimated error make the derivative
     (Ridders, Advances in Engineering Software 4, 1982). One side is enough, at a lower order.

@@ -235,7 +235,7 @@ class VariedKeys:
         self.start = np.array([self._starts[group[0]] for group in self._groups])
 
     def changes(self, values: Array) -> dict[Key, float]:
-        """Return the values of all keys by `values` (n,) of the first key of each text, in their units."""
+        """Return the values of all keys by `values` (n,) of each text's first key, in their units."""
         pairs = zip(self._groups, values / self.start, strict=True)
         return {key: float(self._starts[key] * c) for group, c in pairs for key in group}
 

@@ -196,7 +196,7 @@ class PoseComparison:
 
     @property
     def frequency_error(self) -> Array:
-        """Relative errors (k,) of the fitted frequencies of the k peaks of the measured sum of magnitudes."""
+        """Relative errors (k,), no unit, of the fitted frequencies of the k peaks of the measured sum of magnitudes."""
         measured = _peaks(self.pose.frequency, self.pose.receptance, STANDS_OUT)
         fitted = _peaks(self.pose.frequency, self.after, 0.1 * STANDS_OUT)
         if not len(fitted):
@@ -304,7 +304,8 @@ class _Residuals:
 def differentiated(equations: Equations, values: Array, place: Sequence[Array]) -> list[tuple[Array, ...]]:
     """Return derivatives of the poses' equations, [pose][parameter], by forward differences per unit of parameter.
 
-    `place`: M, K, D, J of each pose in one array (`unstacked`), as `equations` returns them at `values` (n,).
+    `place`: M, K, D, J of each pose in one array (`unstacked`), SI, as `equations` returns them at `values` (n,), in
+    units of the keys.
     """
     found = []
     for step in np.diag(STEP * values):

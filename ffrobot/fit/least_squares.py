@@ -101,7 +101,7 @@ class Fit(Parameters):
 
     @property
     def error(self) -> Array:
-        """Relative errors (m,) of the fitted frequencies."""
+        """Relative errors (m,), no unit, of the fitted frequencies."""
         return self.after / self.measured - 1.0
 
     @property
@@ -155,8 +155,8 @@ def fit_frequencies(
 ) -> Fit:
     """Find the parameters, from `start` (n,) on, whose frequencies are nearest to the `measured` ones (m,), Hz.
 
-    `frequencies` returns those (m,), Hz, of parameters (n,). `uncertainty` (m,): standard deviations of `measured`, Hz.
-    `keys` and `labels` name parameters and modes.
+    `frequencies` returns those (m,), Hz, of parameters (n,) in units of `keys`. `uncertainty` (m,), Hz: standard
+    deviations of `measured`. `keys` and `labels` name parameters and modes.
 
     Raises:
         InputError: fewer frequencies than parameters, or parameters that they cannot distinguish.
@@ -228,7 +228,7 @@ def check_distinguishable(
 def uncertainty_of(J: Array, r: Array, *, known: bool) -> dict[str, Any]:
     """Return the `relative_deviation` (n,) and `correlation` (n, n) of `Parameters`, no unit.
 
-    By residuals r (m,) and their derivatives J (m, n); NaN for m = n without `known` measurement uncertainties.
+    By residuals r (m,), their derivatives J (m, n), no unit; NaN for m = n without `known` measurement uncertainties.
     """
     m, n = J.shape
     inverse = np.linalg.inv(J.T @ J) if known or m > n else np.full((n, n), np.nan)

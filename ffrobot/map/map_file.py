@@ -87,7 +87,7 @@ def _columns(poses: PoseMap, name: str, values: Array) -> dict[str, Array]:
 def best_turns(poses: PoseMap) -> dict[str, tuple[Array, Array]]:
     """Return, for "compliant" and "locked" joints, the tool's turn (rad) of largest stable depth, and this depth (m).
 
-    Arrays over the axes of the grid except "turn"; NaN where no turn is possible. Empty without turns or milling.
+    Arrays (…) over the axes of the grid except "turn"; NaN where no turn is possible. Empty without turns or milling.
     """
     plan = poses.plan
     if plan.turned_about is None:

@@ -156,7 +156,7 @@ class Shape:
     body: MovingBody
     points: Array  # (k, 3) x, in the frame, in m
     shapes: Array  # (k, 3, n) Φ, displacement in m per unit of coordinate
-    coordinates: Array  # (T, n) over the outputs
+    coordinates: Array  # (T, n) over the outputs, m·√kg of modes, else m
     cells: Integers  # (c, v) points that make a line (v = 2) or a facet
 
     @property
@@ -192,7 +192,7 @@ def coarse_surface(results: Results, body: MovingBody, size: float, limit: int, 
 
 
 def numbered_cells(shapes: Sequence[Shape]) -> list[Integers]:
-    """Return the cells of each shape, with numbers of points in one common list of all shapes."""
+    """Return the cells (c, v) of each shape, with numbers of points in one common list of all shapes."""
     first = np.cumsum([0, *(len(shape.points) for shape in shapes[:-1])])
     return [shape.cells + start for shape, start in zip(shapes, first, strict=True)]
 

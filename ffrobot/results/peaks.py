@@ -90,7 +90,7 @@ def peak_of(dataset: h5py.Dataset, time: Array, column: int | None = None) -> tu
 
 
 def write_peaks(group: h5py.Group, time: Array, histories: Mapping[str, Array], outputs: Indices) -> None:
-    """Write `histories` (T, …) at `time` (T,), s: datasets at `outputs`, with attributes by all times.
+    """Write `histories` (T, …), SI units, at `time` (T,), s: datasets at `outputs`, with attributes by all times.
 
     The attributes are `peak`, `peak_time`, `rms`, `mean` of every column, or of the length of vectors.
     """

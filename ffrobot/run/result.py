@@ -67,7 +67,7 @@ class Histories:
 
     prepared: Prepared = field(repr=False)  # the scene
     run: Run  # the motion at all these T times
-    outputs: Indices  # numbers of those that are outputs
+    outputs: Indices  # numbers (k,) of those that are outputs
 
     @cached_property
     def reactions(self) -> Mapping[str, Wrench]:

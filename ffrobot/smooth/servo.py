@@ -31,7 +31,7 @@ COLUMNS = ["frequency", "magnitude", "phase"]
 class Axis:
     """Controller of one joint, motor angle by set point: G(s) = e^(−delay·s) numerator/denominator, `delay` in s.
 
-    Coefficients begin with the highest power; the last of both is 1. `words` describe it in messages.
+    Coefficients (k,), powers of s, begin with the highest power; the last is 1. `words` describe it in messages.
     """
 
     numerator: Array
@@ -41,7 +41,7 @@ class Axis:
 
     @property
     def poles(self) -> ComplexArray:
-        """Poles of G, 1/s, none of them double."""
+        """Poles (k,) of G, 1/s, none of them double."""
         roots = np.roots(self.denominator)
         is_real = np.abs(roots.imag) < APART * np.abs(roots)
         real, upper = np.sort(roots[is_real].real), np.sort_complex(roots[~is_real & (roots.imag > 0.0)])
@@ -51,7 +51,7 @@ class Axis:
         return np.concatenate([real, upper, upper.conj()])
 
     def at(self, s: ComplexArray) -> ComplexArray:
-        """Return G, a ratio of angles or of displacements, at s (1/s) of any shape."""
+        """Return G (…), a ratio of angles or of displacements, at s (…), 1/s."""
         return np.asarray(np.exp(-self.delay * s) * np.polyval(self.numerator, s) / np.polyval(self.denominator, s))
 
 

@@ -37,7 +37,7 @@ class OrientationLaw:
         return _core.TurningLaw(kind, list(self.functions), reference)
 
     def sample(self, times: Array) -> Array:
-        """Return triads A (T, 3, 3), columns, at `times` (T,), s; for a direction the smallest turn of z onto it."""
+        """Return triads A (T, 3, 3), unit columns, at `times` (T,), s; for a direction the smallest turn of z to it."""
         return self.in_core.sample(times)[0].reshape(-1, 3, 3)
 
 

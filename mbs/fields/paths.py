@@ -21,7 +21,7 @@ SAME_TIME = 1e-12  # of a motion's duration: breaks nearer to each other are one
 class Piecewise:
     """n components (m, rad) over time: polynomials between `breaks` (k + 1,), s; outside they rest where they are.
 
-    coefficients: (k, order, n), highest power first, in powers of t − left break.
+    coefficients: (k, order, n), SI, highest power first, in powers of t − left break.
     """
 
     breaks: Array
@@ -43,7 +43,7 @@ class Piecewise:
         return Piecewise(factor * self.breaks + delay, self.coefficients * powers[None, :, None])
 
     def along(self, change: Array) -> "Piecewise":
-        """Return the motion of one component times a vector `change` (n,)."""
+        """Return the motion of one component times a vector `change` (n,), any unit."""
         return Piecewise(self.breaks, self.coefficients * change)
 
     @property
@@ -173,7 +173,7 @@ def averaging_times(distance: float, limits: PathLimits) -> tuple[float, float, 
 
 
 def averaged_step(times: Array) -> Piecewise:
-    """Return the unit step at 0, averaged over each of the `times` (m + 1,), s: a law with m continuous derivatives.
+    """Return a step from 0 to 1, averaged over each of the `times` (m + 1,), s: with m continuous derivatives.
 
     The highest derivative is constant between the sums of some of the times; the others follow by integration.
     """

@@ -31,11 +31,11 @@ class Boundary(NamedTuple):
 
 
 class Scheme(NamedTuple):
-    """s collocation points `c` on [0, 1], and weights of values there in single and double integrals of p̈."""
+    """s collocation points `c` (s,) on [0, 1], and weights of values there in integrals of p̈, no unit."""
 
     c: Array
     to_powers: Array  # (s, s) values → coefficients of 1, ξ, ξ² …
-    stage_once: Array  # (s, s)
+    stage_once: Array  # (s, s), in single integrals; `stage_twice` in double ones
     stage_twice: Array
     end_once: Array  # (s,)
     end_twice: Array
@@ -67,7 +67,7 @@ def between(breaks: Array, xi: Array) -> Array:
 class Problem:
     """Equations r(t, p, ṗ, p̈) = 0 with boundary conditions, for N `times` (N,), s, at once: p, ṗ, p̈ (N, n), SI units.
 
-    residual(times, p, ṗ, p̈) is r (N, n). derivatives(times) are ∂r/∂p̈, ∂r/∂ṗ, ∂r/∂p (3, N, n, n): they only
+    residual(times, p, ṗ, p̈) is r (N, n), SI. derivatives(times) are ∂r/∂p̈, ∂r/∂ṗ, ∂r/∂p (3, N, n, n), SI: they only
     set the pace of Newton's method. `scale` (n,) is about |ṗ|/|p|, 1/s, `size` a typical |scale · p|. All conditions at
     the start make it an initial value problem; then intervals have to resolve vibrations, or errors of these grow.
     """
@@ -83,7 +83,7 @@ class Problem:
 
 @struct
 class Found:
-    """A solution p(t) of `collocate`, (n,) values; whether Newton's method converged, and its iterations.
+    """A solution p(t) (n,) of `collocate`, SI units; whether Newton's method converged, and its iterations.
 
     `worst` is the time, s, at which the last Newton step was largest, or the residual was NaN.
     """
@@ -95,7 +95,7 @@ class Found:
 
 
 def collocate(problem: Problem, breaks: Array, guess: PPoly) -> Found:
-    """Solve `problem` by Newton's method on `breaks` (N+1,), s, from a `guess` of p(t), (n,) values."""
+    """Solve `problem` by Newton's method on `breaks` (N+1,), s, from a `guess` of p(t) (n,), SI units."""
     h, times = np.diff(breaks), between(breaks, problem.scheme.c)
     N, s, n = len(h), len(problem.scheme.c), len(problem.scale)
     linear = _LinearSystem(problem, breaks, [x.reshape(N, s, n, n) for x in problem.derivatives(times)])
@@ -121,7 +121,7 @@ def collocate(problem: Problem, breaks: Array, guess: PPoly) -> Found:
 
 
 def stage_states(scheme: Scheme, h: Array, p: Array, v: Array, K: Array) -> tuple[Array, Array]:
-    """States p and ṗ (N, s, n) at the Gauss points of N intervals of lengths `h` (N,), s.
+    """States p and ṗ (N, s, n), SI units, at s Gauss points of each of N intervals of lengths `h` (N,), s.
 
     From p and ṗ = `v` (N + 1, n) at the breaks, and p̈ = K (N, s, n) at the Gauss points.
     """
@@ -132,7 +132,7 @@ def stage_states(scheme: Scheme, h: Array, p: Array, v: Array, K: Array) -> tupl
 
 
 def piecewise(scheme: Scheme, breaks: Array, p: Array, v: Array, K: Array) -> PPoly:
-    """p(t) (n,) from p, ṗ = `v` (N + 1, n) at the `breaks` (N + 1,), s, and p̈ = K (N, s, n) at the Gauss points."""
+    """p(t) (n,), any unit, from p, ṗ = `v` (N + 1, n) at `breaks` (N + 1,), s, and p̈ = K (N, s, n) at Gauss points."""
     h = np.diff(breaks)[:, None]
     powers = np.einsum("mi,Nin->mNn", scheme.to_powers, K)
     integrated = [x / ((m + 1) * (m + 2) * h**m) for m, x in enumerate(powers)]
@@ -143,7 +143,7 @@ class Elimination:
     """Newton's equations E K + G (p, ṗ) = b for p̈ = K at the s Gauss points of N intervals, solved for K.
 
     (p, ṗ) (2n,) are values where an interval starts. `E_inverse` (N, s n, s n), `G` (N, s n, 2n), and `response`
-    (N, s, n, 2n), −E⁻¹ G, of K to (p, ṗ).
+    (N, s, n, 2n), −E⁻¹ G, of K to (p, ṗ), are in SI units.
     """
 
     def __init__(self, scheme: Scheme, h: Array, derivatives: Sequence[Array]) -> None:

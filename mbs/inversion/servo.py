@@ -189,7 +189,7 @@ def make_servo(model: Model, end: float, goes_on: Callable[[], bool], kind: str 
 
 
 def through(times: Array, values: Array) -> TimeFunction:
-    """Quintic Hermite pieces through values, rates and accelerations (3, T) at `times` (T,), s; outside at rest."""
+    """Quintic Hermite pieces by values, rates, accelerations (3, T), any unit, at `times` (T,), s; outside at rest."""
     curve = scipy.interpolate.PPoly.from_bernstein_basis(scipy.interpolate.BPoly.from_derivatives(times, values.T))
     pieces = TimeFunction.polynomial(curve.x, np.ascontiguousarray(curve.c.T))
     return pieces.held(float(times[0]), float(times[-1]))

@@ -239,7 +239,7 @@ def with_corners(breaks: Array, functions: Iterable[_core.TimeFunction]) -> Arra
 
 
 def cut(breaks: Array, excess: Array) -> Array:
-    """Return `breaks` (N + 1,), s, with intervals divided by their `excess` (N,), error by tolerance; error ∝ h⁴."""
+    """Return `breaks` (N + 1,), s, with intervals divided by their `excess` (N,), error over tolerance ∝ h⁴."""
     parts = np.where(excess > 1, np.clip(np.ceil(1.1 * np.minimum(excess, 1e9) ** 0.25), 2, MOST_PARTS), 1).astype(int)
     pieces = [np.linspace(a, b, k, endpoint=False) for a, b, k in zip(breaks[:-1], breaks[1:], parts, strict=True)]
     return np.concatenate([*pieces, breaks[-1:]])

@@ -249,7 +249,7 @@ class JointRecord(Record):
         return of_rpy(*self.rpy)
 
     def triads(self) -> tuple[Array, Array]:
-        """Return the joint's axes (3, 3), columns, on its first and its second side, in axes of the sections."""
+        """Return the joint's axes (3, 3), unit columns, on its first and its second side, in axes of the sections."""
         return np.eye(3), self.orientation.T
 
     def turned_around(self, coordinates: Array) -> Array:
@@ -261,15 +261,15 @@ class JointRecord(Record):
         return self.turned_around(rate)
 
     def state(self, coordinates: Array) -> Array:
-        """Return q (q_count,) of the core, rad or m, from `coordinates` (k,) as the scene has them."""
+        """Return q (q_count,) of the core from `coordinates` (k,) as the scene has them, both rad or m."""
         return coordinates
 
     def velocity(self, rates: Array) -> Array:
-        """Return v (freedoms,) of the core, rad/s or m/s, from `rates` (k,) as the scene has them."""
+        """Return v (freedoms,) of the core from `rates` (k,) as the scene has them, both rad/s or m/s."""
         return self.state(rates)
 
     def coordinates(self, q: Array) -> Array:
-        """Return coordinates (…, k), rad or m, in the scene's order from the core's q (…, q_count); or rates from v."""
+        """Return coordinates (…, k) in the scene's order from the core's q (…, q_count), rad or m; or rates from v."""
         return q
 
     # Joints that can have motors or gears override these.

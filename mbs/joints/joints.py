@@ -93,11 +93,11 @@ class CylindricalJoint(AxialJoint):
     along = (Along("turn", 2), Along("slide", 2))
 
     def state(self, coordinates: Array) -> Array:
-        """Return q (…, 2): displacement, m, then angle, rad, of `coordinates` (…, 2): angle, then displacement."""
+        """Return q (…, 2), m and rad: displacement, angle, of `coordinates` (…, 2), rad and m: angle, displacement."""
         return coordinates[..., ::-1]
 
     def coordinates(self, q: Array) -> Array:
-        """Return coordinates (…, 2) as the scene has them: angle, rad, then displacement, m."""
+        """Return coordinates (…, 2) of the scene, rad and m: angle, displacement, from q (…, 2), m and rad."""
         return q[..., ::-1]
 
 

@@ -25,10 +25,10 @@ class RobotModes:
     """The f modes of a robot, slowest first; two real poles that follow each other make one."""
 
     poles: ComplexArray  # (f, 2) complex, 1/s
-    # (f, s) complex, by mode the increments δs of s independent coordinates in the first pole's eigenvector, of unit
-    # kinetic amplitude (δsᴴ M δs = 1), the largest free coordinate real
+    # (f, s) complex, SI, by mode the increments δs of s independent coordinates in the first pole's eigenvector, of
+    # unit kinetic amplitude (δsᴴ M δs = 1), the largest free coordinate real
     shape: ComplexArray
-    motion: ComplexArray  # (f, coordinates) complex, the same as δq of all bodies
+    motion: ComplexArray  # (f, coordinates) complex, SI, the same as δq of all bodies
     round_off: float  # 1/s, by which a double pole at 0 may be off
 
     @property
@@ -45,7 +45,7 @@ class RobotModes:
 
     @property
     def damping_ratio(self) -> Array:
-        """Damping ratios (f,) −(λ₁ + λ₂)/2√(λ₁ λ₂) of pairs of poles; NaN for frequency 0."""
+        """Damping ratios (f,) −(λ₁ + λ₂)/2√(λ₁ λ₂), no unit, of pairs of poles; NaN for frequency 0."""
         omega = 2 * np.pi * self.frequency
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(omega > 0.0, -self.poles.sum(axis=1).real / (2 * omega), np.nan)
@@ -54,7 +54,7 @@ class RobotModes:
 def robot_modes(K: Array, D: Array, back: Array, transformation: Array) -> RobotModes:
     """Poles and shapes of z̈ + D̂ ż + K̂ z = 0, where K̂, 1/s², and D̂, 1/s, are (f, f).
 
-    `back` (s, f) takes z to s independent coordinates, `transformation` (coordinates, s) these to δq of all bodies.
+    `back` (s, f) takes z to s independent coordinates, `transformation` (coordinates, s) these to δq of all bodies, SI.
     """
     f = len(K)
     if np.any(D):
@@ -85,7 +85,7 @@ def _pairs(poles: ComplexArray) -> Indices:
 
 
 class FreeCoordinates(NamedTuple):
-    """Coordinates z (m,) that joint conditions leave free: δs = N z, N (f, m), of f independent coordinates s.
+    """Coordinates z (m,), √kg·m, that joint conditions leave free: δs = N z, N (f, m), SI, of f coordinates s.
 
     With z the mass matrix is the identity, the stiffness K, 1/s², and the damping D, 1/s, (m, m).
     """
@@ -107,7 +107,7 @@ class JointCondition:
 
 
 class Stiffness(NamedTuple):
-    """Stiffness of a point, N/m: `along` each of d axes (d,), and the `least`, with its `direction` (d,)."""
+    """Stiffness of a point, N/m: `along` each of d axes (d,), and the `least`, with its unit `direction` (d,)."""
 
     along: Array
     least: float
@@ -161,19 +161,19 @@ def free_coordinates(mechanism: LinearMechanism, condition: str) -> FreeCoordina
 
 
 def frequency_response(free: FreeCoordinates, J: Array, omega: Array) -> ComplexArray:
-    """(F, k) motion per unit load along each row of the Jacobian `J` (k, f), m/N or rad/(N·m); `omega` (F,), rad/s."""
+    """(F, k) motion per unit load, m/N or rad/(N·m), along rows of the Jacobian J (k, f), SI; `omega` (F,), rad/s."""
     J = J @ free.N
     return np.einsum("ki,fik->fk", J, vibration(np.eye(len(J.T)), free.K, free.D, J, omega))
 
 
 def vibration(M: Array, K: Array, D: Array, J: Array, omega: Array) -> ComplexArray:
-    """Coordinates (F, f, k) (K + iωD − ω²M)⁻¹ Jᵀ by unit loads along rows of `J` (k, f), at `omega` (F,), rad/s."""
+    """Coordinates (F, f, k) (K + iωD − ω²M)⁻¹ Jᵀ by unit loads along rows of J (k, f), SI; `omega` (F,), rad/s."""
     w = omega[:, None, None]
     return np.linalg.solve(K + 1j * w * D - w**2 * M, np.broadcast_to(J.T, (len(omega), *J.T.shape)))
 
 
 def free_directions(R: Array) -> Array:
-    """Orthonormal directions (f, m) z with R z = 0, of `R` (r, f), whose rows may be dependent."""
+    """Orthonormal directions (f, m) z, no unit, with R z = 0, of R (r, f), any unit, whose rows may be dependent."""
     sizes = np.linalg.norm(R, axis=1, keepdims=True)
     return null_space(R / np.where(sizes > 0.0, sizes, 1.0), DEPENDENT)
 

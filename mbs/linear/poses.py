@@ -81,8 +81,8 @@ class PoseEvaluator:
 
         Of the point, with d axes, k translations and rotations: `place` and `sag` (d,) m, `manipulability`, √det(J Jᵀ)
         of its velocity by rates of joints with motors (Yoshikawa, 1985); by "joints_locked/…", "joints_compliant/…":
-        `frequency` (count,) Hz, `compliance` (k, k), `stiffness` (d,) and `least_stiffness` N/m, its `direction` (d,),
-        `response` (F, d) m/N. Of the robot: `torque` (motors,) N·m or N, `robot` (segments, 2, 3) m.
+        `frequency` (count,) Hz, `compliance` (k, k) SI, `stiffness` (d,) and `least_stiffness` N/m, its `direction`
+        (d,), `response` (F, d) m/N. Of the robot: `torque` (motors,) N·m or N, `robot` (segments, 2, 3) m.
         """
         q, tree = self._all(q), self.model.tree
         before = self._place(q)

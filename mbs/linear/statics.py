@@ -78,7 +78,7 @@ def newton(
     states: Array,
     most: int = MOST_ITERATIONS,
 ) -> tuple[Array, Booleans]:
-    """Newton's method from `states` (T, …) in at most `most` steps: the states it leads to, and which converge (T,).
+    """Newton's method from `states` (T, …), any unit, in at most `most` steps: last states, and which converge (T,).
 
     `correct`(states, their numbers), called for those that do not converge yet, returns their steps (T, n), scaled to
     order 1, and which converge with these (T,). `move`(states, steps) returns the next states.
@@ -120,7 +120,7 @@ class Statics:
         self.sizes, self.row_sizes, self.length = model.natural_sizes, model.row_sizes, model.size
 
     def equilibrium(self, q: Array, locked: Indices | None = None) -> Array:
-        """The equilibrium (n_q,), rad and m, that Newton's method reaches from q (n_q,).
+        """The equilibrium that Newton's method reaches from q, both (n_q,), rad and m.
 
         Coordinates of v with numbers `locked` stay. Raises `SolveError` where it reaches none.
         """
@@ -201,13 +201,13 @@ class Statics:
         return Balance(Q, Q - multipliers @ J, missed, J, multipliers, independent=independent, size=size)
 
     def stiffness(self, q: Array, at: Balance) -> Array:
-        """Exact slopes (n_v, n_v) of constraint forces less loads by q, at q (n_q,); units and multipliers as `at`."""
+        """Exact slopes (n_v, n_v), natural sizes, of constraint forces less loads at q (n_q,), SI; see `at`."""
         multipliers = at.multipliers / self.row_sizes * self.model.row_signs
         K = self.system.core.stiffness_at_rest(self.system.scene, self.t, q, multipliers, at.independent)
         return K * self.sizes * self.sizes[:, None]
 
     def holding_multipliers(self, q: Array) -> Array:
-        """Multipliers, N or N·m, by equation, that balance loads at q (n_q,); the least if some are redundant."""
+        """Multipliers, N or N·m, by equation, that balance loads at q (n_q,), SI; the least if some are redundant."""
         at, J = self._at_rest(q)
         return np.linalg.lstsq(J.T, at.Q * self.sizes, rcond=DEPENDENT)[0] / self.row_sizes
 
@@ -296,12 +296,12 @@ def static_shapes(
     stiffness: Callable[[Array, Indices], Array],
     count: int,
 ) -> tuple[Array, Booleans]:
-    """Modal coordinates p (T, n) of all bodies with zero residual `forces` at T = `count` times; which are found (T,).
+    """Modal coordinates p (T, n), m·√kg, of all bodies with zero `forces` at T = `count` times; which are found (T,).
 
     `omega`, `sizes` (n,): frequencies of the modes, rad/s, and p, m·√kg, that bends a link by about its length: beyond
-    it nothing counts as found. `forces`(p, numbers of times) returns residual modal forces (k, n) with joints that
-    follow p; `stiffness` returns their derivative (k, n, n): at one of `NEIGHBORS` times at first, then at each time
-    whose steps shrink slowly.
+    it nothing counts as found. `forces`(p, numbers of times) returns residual modal forces (k, n), N/√kg, with joints
+    that follow p; `stiffness` returns their derivative (k, n, n), 1/s²: at one of `NEIGHBORS` times at first, then at
+    each time whose steps shrink slowly.
     """
     K, ratio, before = np.zeros((count, len(omega), len(omega))), np.full(count, SLOW), np.full(count, np.inf)
     least = STRAIGHT * float((omega * sizes).min(initial=np.inf))

@@ -23,7 +23,7 @@ RIGID = 1e-9  # of the largest strain of a unit motion, in units of its spring: 
 class Vibrations(NamedTuple):
     """Vibrations of M q̈ + D q̇ + K q = −C_vᵀλ, C_v q̇ = 0 about rest, without rigid motion. SI units.
 
-    frequency ω (n,) rad/s ascending; damping_ratio (n,); shape (n_v, n), M-orthonormal; springs K (n_v, n_v).
+    frequency ω (n,) rad/s ascending; damping_ratio (n,), no unit; shape (n_v, n), M-orthonormal; K (n_v, n_v).
     """
 
     frequency: Array
@@ -53,7 +53,7 @@ def vibrations_of(system: MultibodySystem, t: float, q: Array) -> Vibrations:
 
 
 def elastic_shapes(M: Array, K: Array, C_v: Array) -> tuple[Array, Array]:
-    """ω² (n,), 1/s², and M-orthonormal shapes (n_v, n) that strain springs while C_v q̇ = 0; units are those of M, K."""
+    """ω² (n,), 1/s², and M-orthonormal shapes (n_v, n) that strain springs while C_v q̇ = 0; units: those of M, K."""
     free = null_space(C_v, DEPENDENT)
     L_inverse = np.linalg.inv(np.linalg.cholesky(free.T @ M @ free))
     squares, vectors = np.linalg.eigh(L_inverse @ free.T @ K @ free @ L_inverse.T)

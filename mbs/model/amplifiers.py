@@ -41,7 +41,7 @@ class Hysteresis:
         return Hysteresis(weights, W * self.thresholds - np.cumsum(self.weights * self.thresholds, axis=0))
 
     def plays(self, z: Array, V: Array) -> Array:
-        """Return states (…, MOST_PLAYS, k), V, of play operators at voltages V (…, k) after states z (MOST_PLAYS, k).
+        """Return states (…, MOST_PLAYS, k) of play operators at voltages V (…, k) after states z (MOST_PLAYS, k), all V.
 
         Voltages of each patch only rise, or only fall.
         """
@@ -127,7 +127,7 @@ class Amplifiers:
     def advance(self, h: float, now: Array, wanted: tuple[Array, Array], strain: Array) -> tuple[Array, Array]:
         """Return voltages (k,), V, after a step `h` (s) from those `now` (k,), and their means over it.
 
-        `wanted` (k,), V, is linear in the step, from its first to its second value; `strain` (k,): current Φ_Vᵀ ṗ, A.
+        `wanted`, two of (k,), V, is linear in the step, from the first to the second; `strain` (k,), A: current Φ_Vᵀ ṗ.
         """
         with np.errstate(divide="ignore"):
             x = h / self.lag

@@ -25,13 +25,13 @@ IN_PLANE = ("t_x", "t_y", "r_z", "omega_zz")
 
 @struct
 class Stiffening:
-    """Integrals of G (n, n): bending moves points by −½ pᵀ G_l p along axis l; positive K stiffens under a load."""
+    """Integrals of G (n, n), 1/(kg·m): bending moves points by −½ pᵀ G_l p along axis l; K > 0 stiffens under load."""
 
     K_s: Array  # (3, n, n) ∫ρ G_l dV, 1/m
     K_x: Array  # (3, 3, n, n) ∫ρ x_k G_l dV at [k, l], without unit
     # (6, n, n) G of each interface along x, y, z, 1/(kg·m), and of its rotation about them, 1/(kg·m²)
     K_points: Mapping[str, Array]
-    # (3, 3, n, n) part of S̄_kl by the extent of payloads, without unit: `Body.S_bar_kl` lacks it, as only equations
+    # (3, 3, n, n), no unit, part of S̄_kl by the extent of payloads: `Body.S_bar_kl` lacks it, as only equations
     # with K_x have it
     S_turned: Array
 
@@ -159,7 +159,7 @@ class Body(Invariants):
 
     @cached_property
     def on_file(self) -> Array:
-        """Matrix (n, n_file), without unit: modal forces F_p (n,) times it do the same work on the file's modes.
+        """Matrix (n, n_file), no unit: modal forces F_p (n,), N/√kg, times it do the same work on the file's modes.
 
         After `truncation.with_fewer_modes`, these forces are those of loads at its `loaded` points.
         """
@@ -342,7 +342,7 @@ def bent_section(body: Body, point: str, p: Array) -> BentSection:
 
 
 def orientation(tool: Tool) -> Array:
-    """Return the axes (3, 3) of a tool, columns, in body axes."""
+    """Return the axes (3, 3) of a tool, unit columns, in body axes."""
     return about(2, tool.angle) @ of_rpy(*tool.rpy)
 
 

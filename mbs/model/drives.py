@@ -9,7 +9,7 @@ from .._core import ForceSource, TimeFunction
 
 
 class Drive(NamedTuple):
-    """Force `size`, a function of time, N or N·m, along the generalized `direction` (n_v,)."""
+    """Generalized force: `size`, a function of time, N or N·m, times `direction` (n_v,), SI units."""
 
     direction: Array
     size: TimeFunction
@@ -23,7 +23,7 @@ class PointDrive(NamedTuple):
 
 
 class Command(NamedTuple):
-    """Generalized forces `direction` (n_v,) of a unit command: 1 N·m, N or V.
+    """Generalized forces `direction` (n_v,), SI units, of a unit command: 1 N·m, N or V.
 
     For a motor that turns frames, not sections, `frame` has the index of the body and the sign of the torque on it.
     """

@@ -113,7 +113,7 @@ def compliance(node: Node) -> tuple[TwistSpring, float] | None:
 
 
 def gear_matrices(tree: KinematicTree, q: Array) -> tuple[Array, Array]:
-    """Return K (N·m/rad, N/m) and D (N·m·s/rad, N·s/m), (n_v, n_v), of compliant gears at q (n_q,)."""
+    """Return K (N·m/rad, N/m) and D (N·m·s/rad, N·s/m), (n_v, n_v), of compliant gears at q (n_q,), SI."""
     K, D = np.zeros((2, tree.n_v, tree.n_v))
     for gear in tree.gears:
         twist = np.zeros(tree.n_v)
@@ -124,7 +124,7 @@ def gear_matrices(tree: KinematicTree, q: Array) -> tuple[Array, Array]:
 
 
 def resistance(model: Model, q: Array, v: Array) -> Array:
-    """Return negative forces (T, n_v) of friction in all joints, cut ones too, SI, at q (T, n_q) and v (T, n_v)."""
+    """Return negative forces (T, n_v) of friction in all joints, cut ones too, at q (T, n_q) and v (T, n_v), all SI."""
     force = model.along_cut.resistance(q, v)
     for column, friction in _frictions(model.tree):
         force[:, column] += friction.resistance(v[:, column])
@@ -132,7 +132,7 @@ def resistance(model: Model, q: Array, v: Array) -> Array:
 
 
 def friction_damping(model: Model, q: Array, *, is_at_rest: bool = False) -> Array:
-    """Return the damping matrix (n_v, n_v), N·m·s/rad or N·s/m, at q (n_q,): viscous, at rest also dry friction."""
+    """Return the damping matrix (n_v, n_v), N·m·s/rad or N·s/m, at q (n_q,), SI: viscous, at rest also dry friction."""
     D = model.along_cut.damping(q, is_at_rest=is_at_rest)
     for column, friction in _frictions(model.tree):
         D[column, column] += friction.damping(is_at_rest=is_at_rest)

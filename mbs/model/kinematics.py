@@ -175,7 +175,7 @@ MOTION = 18  # numbers of one motion in the core: r, F, velocity, omega
 
 
 class Motion(NamedTuple):
-    """Motion of a triad, global axes: r (T, 3), m, axes F (T, 3, 3), velocity, m/s, angular velocity, rad/s, (T, 3)."""
+    """Motion of a triad, global axes: r (T, 3), m, axes F (T, 3, 3), no unit, velocity, m/s, `omega`, rad/s, (T, 3)."""
 
     r: Array
     F: Array
@@ -212,19 +212,19 @@ class Kinematics:
         return cls(nodes, [*points, *still])
 
     def places(self, q: Array, v: Array | None = None) -> "Places":
-        """Return positions (m) and motions (m/s, rad/s) at q (T, n_q) and v (T, n_v), by default at rest."""
+        """Return positions (m) and motions (m/s, rad/s) at q (T, n_q) and v (T, n_v), SI, by default at rest."""
         rates = np.zeros((len(q), self.core.n_v)) if v is None else v
         return Places(
             self._numbers, self.core.motions(q, rates).reshape(len(q), len(self.nodes) + len(self._numbers), MOTION)
         )
 
     def values(self, q: Array, times: Array) -> tuple[Array, Array]:
-        """Return equations C (T, rows), m or rad, at q (T, n_q) and `times` (T,), s; Jacobian C_v (T, rows, n_v)."""
+        """Return equations C (T, rows), m or rad, and C_v (T, rows, n_v), at q (T, n_q), SI, and `times` (T,), s."""
         values, gradients = self.core.constraints(self.scene, times.tolist(), q)
         return self.signs * values, self.signs[:, None] * gradients.reshape(len(q), len(self.signs), self.core.n_v)
 
     def rates(self, q: Array, v: Array, times: Array) -> Array:
-        """Return rates Ċ (T, rows), m/s or rad/s, of the equations at q (T, n_q), v (T, n_v), `times` (T,), s."""
+        """Return rates Ċ (T, rows), m/s or rad/s, of the equations at q (T, n_q), v (T, n_v), SI, `times` (T,), s."""
         return self.signs * self.core.constraint_rates(self.scene, times.tolist(), q, v)
 
 

@@ -52,7 +52,7 @@ class States(Protocol):
 
 
 class KnownStates(NamedTuple):
-    """`States` that are known as arrays."""
+    """`States` that are known as arrays: q (T, n_q), v and a (T, n_v), SI units."""
 
     q: Array
     v: Array
@@ -89,7 +89,7 @@ class MotionForces:
         return self.found.rotors[:, 3 * number : 3 * number + 3]
 
     def carried(self, q: Array) -> list[Wrench]:
-        """Return reactions, N and N·m, of joints about their outer sides, at q (T, n_q).
+        """Return reactions, N and N·m, of joints about their outer sides, (T, 3), at q (T, n_q), SI.
 
         Forces that do work are left out: of motors, loads and friction along joint coordinates.
         """
@@ -167,7 +167,7 @@ def row_accelerations(system: MultibodySystem, state: States, times: Array) -> A
 
 
 def mass_matrices(system: MultibodySystem, q: Array, t: float = 0.0) -> Array:
-    """Return mass matrices (T, n_v, n_v), kg, kg·m², 1 of modes, at q (T, n_q), by forces of unit accelerations."""
+    """Return mass matrices (T, n_v, n_v), SI, at q (T, n_q), SI, by forces of unit accelerations."""
     T, n = len(q), system.model.tree.n_v
     a = np.tile(np.vstack([np.zeros(n), np.eye(n)]), (T, 1))
     states = np.repeat(q, n + 1, axis=0), np.zeros((T * (n + 1), n)), a

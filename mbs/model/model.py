@@ -43,7 +43,7 @@ class Constraints(Kinematics):
         return [row.owner for row in turning], Kinematics(self.nodes, rows=turning)
 
     def natural_gradients(self, q: Array, times: Array, sizes: Array | None = None) -> Array:
-        """Return C_v (T, rows, n_v), without unit, at q (T, n_q) and `times` (T,), s, to find its rank.
+        """Return C_v (T, rows, n_v), no unit, at q (T, n_q), SI, and `times` (T,), s, to find its rank.
 
         Equations are relative to natural sizes, coordinates to `sizes` (n_v,), by default those of joints.
         """
@@ -52,7 +52,7 @@ class Constraints(Kinematics):
         return np.where(np.abs(C_v) > NO_SLOPE, C_v, 0.0)
 
     def turned_over(self, q: Array, times: Array) -> dict[str, Booleans]:
-        """Return by name (T,) whether a loop joint or tool axis is turned by π at q (T, n_q) and `times` (T,), s.
+        """Return by name (T,) whether a loop joint or tool axis is turned by π at q (T, n_q), SI, and `times` (T,), s.
 
         "dot" equations, which do not distinguish senses of parallel axes, are 0 there, too.
         """
@@ -81,10 +81,10 @@ class Constraints(Kinematics):
     def moved(
         self, q: Array, times: Array, beside: Array | None = None, locked: Booleans | None = None
     ) -> tuple[Array, Array]:
-        """Project q (T, n_q) onto C = `beside` (T, rows), SI, default 0, at `times` (T,), s; with residuals (T,).
+        """Project q (T, n_q), SI, onto C = `beside` (T, rows), SI, default 0, at `times` (T,), s; with residuals (T,).
 
-        Newton's method takes least steps of joints not `locked` (n_v,); modal coordinates stay. Residuals are relative
-        to natural sizes, NaN where not finite.
+        Newton's method takes least steps of joints not `locked` (n_v,); modal coordinates stay. Residuals have no unit,
+        relative to natural sizes, NaN where not finite.
         """
         more = np.zeros((0, 0)) if beside is None else self.signs * beside
         scales = self._joint_sizes if locked is None else np.where(locked, 0.0, self._joint_sizes)
@@ -116,7 +116,7 @@ class Model:
 
     @property
     def row_signs(self) -> Array:
-        """Signs (rows,): −1 where the core's equation has the coordinate of a reversed joint, else 1."""
+        """Signs (rows,), no unit: −1 where the core's equation has the coordinate of a reversed joint, else 1."""
         return np.array([row.sign for row in self.rows])
 
     @cached_property
@@ -161,7 +161,7 @@ class Model:
         return row.kind in ("point", "slide")
 
     def along(self, joint: str) -> Array:
-        """Directions in v (k, n_v) of moments on the second side of a joint along its k coordinates."""
+        """Directions ±1 in v (k, n_v) of moments on the second side of a joint along its k coordinates."""
         return self.sign(joint) * np.eye(self.tree.n_v)[_in_order(self.driven(joint))]
 
     def sign(self, joint: str) -> float:
@@ -178,7 +178,7 @@ class Model:
         return replace(self, rows=tuple(row for row in self.rows if not row.is_trajectory))
 
     def modal_directions(self, on_modes: Mapping[str, Array]) -> Array:
-        """Return generalized forces (k, n_v) of k forces (n, k), N/√kg, on the modes of files by body."""
+        """Return generalized forces (k, n_v), N/√kg, of k forces (n, k), N/√kg, on the modes of files by body."""
         (count,) = {forces.shape[1] for forces in on_modes.values()}
         directions = np.zeros((count, self.tree.n_v))
         for node in self.tree.nodes:
@@ -187,7 +187,7 @@ class Model:
         return directions
 
     def compliance(self, forces: Array, others: Array) -> Array:
-        """Return static deflections (k, m) of modes by generalized `forces` (k, n_v) along `others` (m, n_v)."""
+        """Return static deflections (k, m) of modes by generalized `forces` (k, n_v) along `others` (m, n_v), SI."""
         return np.sum([forces[:, of.p_v] / of.body.stiffness @ others[:, of.p_v].T for of in self.tree.nodes], axis=0)
 
     @cached_property
@@ -225,7 +225,7 @@ class Model:
         return sizes
 
     def path_errors(self, times: Array, q: Array) -> dict[str, Array]:
-        """Return path errors (T, m), m or rad, by trajectory, at `times` (T,), s, and q (T, n_q)."""
+        """Return path errors (T, m), m or rad, by trajectory, at `times` (T,), s, and q (T, n_q), SI."""
         C, owners = self.constraints.values(q, times)[0], [row.owner if row.is_trajectory else "" for row in self.rows]
         return {path.name: C[:, [owner == path.name for owner in owners]] for path in self.scene.trajectory}
 

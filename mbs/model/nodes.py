@@ -15,7 +15,7 @@ from .body import Body
 
 
 class Section(NamedTuple):
-    """A triad (3, 3), columns, on section `point` of body no. `body`, or at `position` (3,), m, on the ground (−1).
+    """A triad (3, 3) of columns on section `point` of body no. `body`, or at `position` (3,), m, on the ground (−1).
 
     `still`: about its z it turns with the frame of the body, not with the section.
     """
@@ -56,7 +56,7 @@ class Node:
         return -1.0 if self.backwards else 1.0
 
     def coordinates(self, q: Array) -> Array:
-        """Return the joint's coordinates (…, k), rad or m, in the scene's order, at q (…, n_q)."""
+        """Return the joint's coordinates (…, k), rad or m, in the scene's order, at q (…, n_q), rad and m."""
         own = self.joint.coordinates(q[..., self.q])
         return self.joint.turned_around(own) if self.backwards else own
 
@@ -80,8 +80,9 @@ class ConstraintRow:
     kind: ConstraintKind
     a: Section
     b: Section
-    f: Array  # (3,)
-    g: Array  # (3,)
+    # f, g: (3,) unit vectors; 0 in "coordinate"
+    f: Array
+    g: Array
     is_trajectory: bool = True
     # index in v; "turn" and "slide" subtract this coordinate, if it is not −1
     coordinate: int = -1

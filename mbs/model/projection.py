@@ -95,7 +95,7 @@ class AcrossError(Exception):
 
 
 def axes_across(normal: Array) -> Array:
-    """Return axes (3, 3), rows x, y and the `normal` (3,); x is kept if the normal is perpendicular to it."""
+    """Return unit axes (3, 3), rows x, y and the unit `normal` (3,); x is kept if the normal is across it."""
     x = np.eye(3)[0 if abs(normal[0]) < 0.9 else 1]
     x = x - normal * (normal @ x)
     x /= np.linalg.norm(x)
@@ -103,7 +103,7 @@ def axes_across(normal: Array) -> Array:
 
 
 def axes_of_triad(normal: Array) -> Array:
-    """Return axes (3, 3) of a planar marker, rows x, y and the `normal` (3,), in axes of its triad in space.
+    """Return axes (3, 3) of a planar marker, rows x, y and the unit `normal` (3,), in axes of its triad in space.
 
     Triads of revolute and planar joints have z along the normal; z of prismatic ones, along which they slide, is x.
     """
@@ -119,7 +119,7 @@ def _is_small(across: Array, whole: Array) -> bool:
 
 
 def planar_marker(marker: _core.SpatialMarker, axes: Array) -> _core.PlanarMarker:
-    """Return the marker in 2D; `axes` (3, 3): rows x, y of the plane and its normal, body axes.
+    """Return the marker in 2D; unit `axes` (3, 3): rows x, y of the plane and its normal, body axes.
 
     Raises `AcrossError` if modes move it out of the plane.
     """
@@ -138,7 +138,7 @@ def planar_marker(marker: _core.SpatialMarker, axes: Array) -> _core.PlanarMarke
 
 
 def planar_data(data: _core.SpatialData, axes: Array) -> _core.PlanarData:
-    """Return constants of a body in the plane of the first two `axes` (3, 3), rows.
+    """Return constants of a body in the plane of the first two unit `axes` (3, 3), rows.
 
     Raises `AcrossError` if it bends out of the plane or twists.
     """

@@ -264,12 +264,12 @@ def _add_motors(driven: _core.PlanarDriven | _core.SpatialDriven, model: Model) 
 
 
 def path_forces(model: Model, times: Array, q: Array, multipliers: Array) -> Array:
-    """Return generalized forces −C_sᵀλ_s (T, n_v), N, N·m, N/√kg, of path constraints by multipliers (T, rows), SI."""
+    """Return generalized forces −C_sᵀλ_s (T, n_v) of paths by multipliers (T, rows), N or N·m, at q (T, n_q); SI."""
     return driven_mechanism(model).path_forces(times.tolist(), q, multipliers * model.row_signs)
 
 
 def frames_in_core(model: Model, q: Array) -> list[tuple[Array, Array]]:
-    """Return axes (3, 3) and origin (3,), m, of each body's frame in the core's frame of this body, at q (n_q,)."""
+    """Return axes (3, 3) and origin (3,), m, of each body's frame in the core's frame of this body, at q (n_q,), SI."""
     places, frames = model.tree.places(q[None]), driven_system(model).core.frames(q, np.zeros(model.tree.n_v))
     own = [places.frame(number) for number in range(len(frames))]
     return [(of.R.T @ at.F[0], of.R.T @ (at.r[0] - of.r)) for of, at in zip(frames, own, strict=True)]
@@ -296,13 +296,13 @@ class SplitForces(NamedTuple):
 
 
 def split_forces(model: Model, q: Array, wanted: Array) -> SplitForces:
-    """Find motor torques, modal and loop forces that together are `wanted` (T, n_v), SI, at q (T, n_q)."""
+    """Find motor torques, modal and loop forces that together are `wanted` (T, n_v), at q (T, n_q), SI."""
     tau, left, multipliers = driven_mechanism(model).split(q, wanted)
     return SplitForces(model.by_motor(tau), left, multipliers)
 
 
 def motor_forces(model: Model, q: Array, wanted: Array) -> MotorForces:
-    """Return motor torques and modal forces that make `wanted` (T, n_v), N, N·m, N/√kg, at q (T, n_q)."""
+    """Return motor torques and modal forces that make `wanted` (T, n_v), N, N·m, N/√kg, at q (T, n_q), SI."""
     moments, left, _ = split_forces(model, q, wanted)
     stored = {node.body.name: left[:, node.p_v] @ node.body.on_file for node in model.tree.nodes}
     return MotorForces(moments, stored)
@@ -311,7 +311,7 @@ def motor_forces(model: Model, q: Array, wanted: Array) -> MotorForces:
 class FrameShare(NamedTuple):
     """Modal forces of a unit torque, 1 N·m, of a motor that turns frames, in addition to its torque along the joint.
 
-    `direction` (n_v,), and `slope` (n_v, n_v), its derivative along v, as the axis turns with the section.
+    `direction` (n_v,), SI, and `slope` (n_v, n_v), its derivative along v, as the axis turns with the section.
     """
 
     direction: Array
@@ -319,7 +319,7 @@ class FrameShare(NamedTuple):
 
 
 def frame_share(model: Model, joint: str, q: Array) -> FrameShare:
-    """Return modal forces per torque of a revolute joint's motor on the outer body at q (n_q,): theory.md, Eq. 30."""
+    """Return modal forces per torque of a revolute motor on the outer body at q (n_q,), SI: theory.md, Eq. 30."""
     tree = model.tree
     direction, slope = np.zeros(tree.n_v), np.zeros((tree.n_v, tree.n_v))
     node = tree.nodes[tree.carried[joint]]

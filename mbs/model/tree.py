@@ -65,9 +65,9 @@ class CompliantGear(NamedTuple):
 class KinematicTree:
     """Spanning forest of bodies on their joints, SI units; `loops`: the loop-closing joints, in the scene's order.
 
-    `tools` are points "BODY.POINT" with their own axes (3, 3), columns, in those of the body. `gears` are compliant
-    gears, none where all are rigid (see `gears.with_compliance`). `on_frames` names joints whose angles are between
-    frames (see `build.with_coordinates_of_frames`).
+    `tools` are points "BODY.POINT" with their own axes (3, 3), unit columns, in those of the body. `gears` are
+    compliant gears, none where all are rigid (see `gears.with_compliance`). `on_frames` names joints whose angles are
+    between frames (see `build.with_coordinates_of_frames`).
     """
 
     gears: tuple[CompliantGear, ...] = ()
@@ -109,7 +109,7 @@ class KinematicTree:
         self.carried = {node.joint.name: number for number, node in enumerate(nodes)}
 
     def section(self, side: str, triad: Array = AXES, at: Sequence[float] = (0.0, 0.0, 0.0)) -> Section:
-        """Return section "BODY.POINT", frame of "BODY", or "ground" `at` (3,), m, with a `triad` (3, 3), columns."""
+        """Return section "BODY.POINT", frame of "BODY", or "ground" `at` (3,), m; `triad` (3, 3): columns of axes."""
         if side == GROUND:
             return Section(-1, "", triad, np.array(at, dtype=float))
         body, _, point = side.partition(".")
@@ -157,7 +157,7 @@ class KinematicTree:
         return is_joint
 
     def at_rest(self, guesses: Mapping[str, Array]) -> Array:
-        """Return q (n_q,) of undeformed links; joints have `guesses` (k,) by name in scene order, rad or m, else 0."""
+        """Return q (n_q,), rad and m, of straight links; joints have `guesses` (k,) by name, in scene order, else 0."""
         q = np.zeros(self.n_q)
         for node in self.nodes:
             numbers = len(node.joint.guess_units or node.joint.units)
@@ -166,7 +166,7 @@ class KinematicTree:
         return q
 
     def places(self, q: Array, v: Array | None = None) -> Places:
-        """Return positions (m) and velocities (m/s, rad/s) of frames and sections at q (T, n_q), v (T, n_v) or 0."""
+        """Return positions, m, velocities, m/s, rad/s, of frames and sections at q (T, n_q), v (T, n_v) or 0, SI."""
         return self._moving.places(q, v)
 
     def integrate(self, q: Array, dv: Array) -> Array:
@@ -281,13 +281,13 @@ class AlongCut:
         self._kinematics = Kinematics(tree.nodes, rows=[one.row for one in cut]) if cut else None
 
     def measured(self, q: Array) -> tuple[Array, Array]:
-        """Return γ (T, cut), rad or m, at q (T, n_q), angles within ±π, and G = ∂γ̇/∂v (T, cut, n_v)."""
+        """Return γ (T, cut), rad or m, at q (T, n_q), angles within ±π, and G = ∂γ̇/∂v (T, cut, n_v); SI."""
         if self._kinematics is None:
             return np.zeros((len(q), 0)), np.zeros((len(q), 0, self._n_v))
         return self._kinematics.values(q, np.zeros(len(q)))
 
     def resistance(self, q: Array, v: Array) -> Array:
-        """Return negative generalized forces (T, n_v), N, N·m, N/√kg, of friction at q (T, n_q), v (T, n_v)."""
+        """Return negative generalized forces (T, n_v), N, N·m, N/√kg, of friction at q (T, n_q), v (T, n_v), SI."""
         force = np.zeros_like(v)
         gradients = self.measured(q)[1] if self._rough else force
         for k in self._rough:
@@ -296,7 +296,7 @@ class AlongCut:
         return force
 
     def damping(self, q: Array, *, is_at_rest: bool) -> Array:
-        """Return the damping matrix (n_v, n_v), N·m·s/rad or N·s/m, at q (n_q,): viscous, at rest also dry friction."""
+        """Return the damping matrix (n_v, n_v) at q (n_q,), SI: viscous friction, at rest also dry friction."""
         D = np.zeros((self._n_v, self._n_v))
         gradients = self.measured(q[None])[1][0] if self._rough else D
         for k in self._rough:
@@ -306,7 +306,7 @@ class AlongCut:
         return D
 
     def motions(self, q: Array, v: Array, times: Array) -> list[CutMotion]:
-        """Return motions at q (T, n_q), v (T, n_v) and `times` (T,), s; angles start nearest to their guesses."""
+        """Return motions at q (T, n_q), v (T, n_v), SI, and `times` (T,), s; angles start nearest to their guesses."""
         motions = list[CutMotion]()
         if self._kinematics is None:
             return motions

@@ -43,7 +43,7 @@ def mobilities(model: Model, q: Array, times: Array, loop_rank: int = -1) -> lis
 
 
 def singular_ratios(model: Model, q: Array, times: Array, rank: int) -> Array:
-    """Ratios (T,), smallest to largest of `rank` singular values of all equations at q (T, n_q), `times` (T,), s."""
+    """Ratios (T,), smallest to largest of `rank` singular values of equations at q (T, n_q), SI, `times` (T,), s."""
     constraints, is_path = model.constraints, [False] * len(model.rows)
     motions = constraints.core.mobilities(constraints.scene, times.tolist(), q, is_path, model.size, rank)
     return np.array([at.loop_ratio for at in motions])
@@ -95,7 +95,7 @@ def rank_of_redundant_loops(model: Model, q: Array, rows: Indices) -> int | None
 
 
 def shape_in_redundant_loops(model: Model, q: Array, rows: Indices) -> str:
-    """Why links, straight at q (n_q,), cannot be given a shape: equations `rows` of loops are redundant; else ""."""
+    """Why links, straight at q (n_q,), SI, cannot have a shape: equations `rows` of loops are redundant; else ""."""
     if rank_of_redundant_loops(model, q, rows) is None:
         return ""
     owners = quoted(dict.fromkeys(row.owner for row in model.rows if not row.is_trajectory))
@@ -106,7 +106,7 @@ def shape_in_redundant_loops(model: Model, q: Array, rows: Indices) -> str:
 
 
 def worst_posture(model: Model, times: Array, q: Array, loop_rank: int = -1) -> tuple[float, int]:
-    """Least `Mobility.ratio` of singular values at `times` (T,), s, and q (T, n_q), and number of this time.
+    """Least `Mobility.ratio` of singular values at `times` (T,), s, and q (T, n_q), SI, and number of this time.
 
     `loop_rank`: see `mobilities`.
     """
@@ -115,7 +115,7 @@ def worst_posture(model: Model, times: Array, q: Array, loop_rank: int = -1) -> 
 
 
 def describe_posture(model: Model, ratio: float, t: float, q: Array, *, is_end: bool, loop_rank: int = -1) -> str:
-    """A message on the worst posture q (n_q,) of a path at t (s) with this `ratio` of singular values; "" if regular.
+    """A message on the worst posture q (n_q,), SI, of a path at t (s), `ratio` of singular values; "" if regular.
 
     `is_end`: the run ends there; `loop_rank`: see `mobilities`.
     """

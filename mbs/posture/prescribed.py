@@ -43,7 +43,7 @@ PrescribedMotion = _core.PlanarPrescribedMotion | _core.SpatialPrescribedMotion
 
 
 def prescribed_motion(model: Model, motion: PrescribedMotion, modes: Array, times: Array, near: Array) -> Prescribed:
-    """The motion at `times` (T,), s, for `modes` (3, T, n): p, ṗ, p̈, m·√kg and s, from postures near (T, n_q).
+    """The motion at `times` (T,), s, for `modes` (3, T, n): p, ṗ, p̈, m·√kg and s, from postures `near` (T, n_q), SI.
 
     From one posture, near the first, each is sought next to the one before. Multipliers balance the forces on joints,
     which move freely; the forces on modes that are left hold the shape.

@@ -49,7 +49,7 @@ def undeformed_posture(model: Model) -> State:
 
 
 def rates_on_rows(model: Model, q: Array, v: Array, locked: Booleans | None = None) -> Array:
-    """Return v (n_v,) that meets constraints at q (n_q,), SI, t = 0, by least changes of joints not `locked` (n_v,)."""
+    """Return v (n_v,) that meets constraints at q (n_q,), t = 0, SI, by least changes of joints not `locked` (n_v,)."""
     scales, now = model.joint_sizes if locked is None else np.where(locked, 0.0, model.joint_sizes), np.zeros(1)
     (C_v,) = model.constraints.natural_gradients(q[None], now, scales)
     (C_dot,) = model.constraints.rates(q[None], v[None], now)
@@ -221,8 +221,8 @@ def _guessed_rates(model: Model) -> Array:
 def posture_from_elsewhere(model: Model, guess: Array) -> Array:
     """A posture (n_q,), rad and m, with undeformed links that meets all constraint equations at t = 0.
 
-    For a `guess` (n_q,) that leads to none: where a point follows a path and [initial] names no joint, the nearest of
-    random guesses that leads to one takes its place. Else raises `InputError` with advice.
+    For a `guess` (n_q,), SI, that leads to none: where a point follows a path and [initial] names no joint, the nearest
+    of random guesses that leads to one takes its place. Else raises `InputError` with advice.
     """
     check_reach(model, 0.0)
     scene, constraints, times, (nodes, columns) = model.scene, model.constraints, np.zeros(1), turning_joints(model)
@@ -254,7 +254,7 @@ def posture_from_elsewhere(model: Model, guess: Array) -> Array:
 
 
 def turning_joints(model: Model) -> tuple[list[Node], Indices]:
-    """The joints of the tree with angles, and the numbers of these in q."""
+    """The k joints of the tree with angles, and the numbers (k,) of these in q."""
     tree, columns = model.tree, list[int]()
     turning = [node for node in tree.nodes if node.joint.name in tree.carried and "rad" in node.joint.units]
     for node in turning:
@@ -264,14 +264,14 @@ def turning_joints(model: Model) -> tuple[list[Node], Indices]:
 
 
 def random_angles(guess: Array, columns: Indices, count: int) -> Array:
-    """Postures (`count`, n_q) like `guess` (n_q,), with reproducible random angles, rad, in `columns`."""
+    """Postures (`count`, n_q) like `guess` (n_q,), SI units, with reproducible random angles in `columns`."""
     starts = np.tile(guess, (count, 1))
     starts[:, columns] = np.random.default_rng(0).uniform(-np.pi, np.pi, (count, len(columns)))
     return starts
 
 
 def regular_postures(model: Model, q: Array) -> Array:
-    """Regular postures (…, n_q), rad and m, near q (T, n_q) that satisfy all constraint equations at t = 0."""
+    """Regular postures (…, n_q) near q (T, n_q), rad and m, that satisfy all constraint equations at t = 0."""
     postures, is_met = model.constraints.postures(q, np.zeros(len(q)))
     postures = postures[is_met]
     return postures[are_regular(model, postures, np.zeros(len(postures)))]

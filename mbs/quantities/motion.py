@@ -139,7 +139,7 @@ def acting_forces(run: Run) -> MotionForces:
 
 @kept
 def constraint_rows(run: Run) -> tuple[Array, Array]:
-    """Return C (T, m), m or rad, of m constraint equations, and Jacobians C_v (T, m, n_v)."""
+    """Return C (T, m), m or rad, of m constraint equations, and Jacobians C_v (T, m, n_v), SI."""
     return run.model.constraints.values(run.q, run.time)
 
 

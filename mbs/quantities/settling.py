@@ -52,7 +52,7 @@ class Rest(NamedTuple):
     """Final commanded posture of a run, rad and m."""
 
     model: Model  # the robot under its paths
-    q: Array  # (n_q,)
+    q: Array  # (n_q,) rad and m
     since: float  # s, when the last path is over
     frequency: float  # Hz, the lowest of that robot there; NaN where nothing vibrates
 

@@ -110,8 +110,8 @@ def mode_acceleration(
 ) -> Recovery:
     """Return the recovery by mode acceleration: modes without their static part, and loads with static stresses.
 
-    p (outputs, n), √kg·m, are coordinates of the modes of `body`, its modal body file: T (n, m) times those of the
-    equations. `loads`: sizes (outputs,) of unit loads by name, SI. `sections`: loads of layers.
+    p (outputs, n), √kg·m, are coordinates of the modes of `body`, its modal body file: T (n, m), no unit, times those
+    of the equations. `loads`: sizes (outputs,) of unit loads by name, SI. `sections`: loads of layers.
     """
     known = [name for name in body.stress_loads if name in loads]
     if not known:

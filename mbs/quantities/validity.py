@@ -29,7 +29,7 @@ AT_ONCE = 64  # outputs whose eigenvalues are found together
 
 
 class LoadedPoint(NamedTuple):
-    """Interface at `position` (3,), m, with mode shapes (6, n) and geometric stiffness K (6, n, n) per unit load."""
+    """Interface at `position` (3,), m, with mode shapes (6, n), geometric stiffness K (6, n, n) per unit load; SI."""
 
     position: Array
     by_modes: Array
@@ -38,7 +38,7 @@ class LoadedPoint(NamedTuple):
 
 @struct
 class ModalLoads:
-    """Loads of sizes f (T, J), SI, with geometric stiffness K (J, n, n), on modes of stiffness K_ff (n,), rad²/s².
+    """Loads f (T, J), with geometric stiffness K (J, n, n) per unit, on modes of `stiffness` K_ff (n,); SI units.
 
     `support`: where the inner joint carries the link; rotations that the joint leaves free are 0 there.
     """
@@ -51,13 +51,13 @@ class ModalLoads:
 
     @cached_property
     def relative(self) -> Array:
-        """Matrices (J, n, n) K_ff^-½ K K_ff^-½."""
+        """Matrices (J, n, n) K_ff^-½ K K_ff^-½, per unit of load, SI."""
         root = 1 / np.sqrt(self.stiffness)
         return self.K * root * root[:, None]
 
     @cached_property
     def squares(self) -> Array:
-        """Squared Frobenius norms (T,) of K_ff^-½ S K_ff^-½, S = Σ f_j K_j."""
+        """Squared Frobenius norms (T,), no unit, of K_ff^-½ S K_ff^-½, S = Σ f_j K_j."""
         flat = self.relative.reshape(len(self.K), -1)
         return np.maximum(((self.f @ (flat @ flat.T)) * self.f).sum(axis=1), 0.0)
 

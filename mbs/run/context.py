@@ -41,7 +41,7 @@ class PatchedLink(Protocol):
 
     @property
     def to_reached(self) -> Mapping[str, Array]:
-        """Matrices (m, n), by body, from forces on n modes of the file to those on m modes that patches reach."""
+        """Matrices (m, n), no unit, by body, from forces on n modes of the file to those on m that patches reach."""
 
     def allocation(self, *, limited: bool) -> _core.Allocation:
         """Return the map from m modal forces to k voltages, with limits of the patches or without."""

@@ -103,7 +103,7 @@ def _along(node: Node, state: States) -> Array:
 class MotorCoordinates(NamedTuple):
     """Motion in the coordinates of a robot with compliant gears."""
 
-    # (T, n_q), (T, n_v), (T, n_v), SI units
+    # (T, n_q), (T, n_v), (T, n_v), SI
     q: Array
     v: Array
     a: Array

@@ -129,7 +129,7 @@ def faster_of(
 ) -> Choice:
     """DOP853 or Radau IIA, whichever is expected to be faster, with the other to take over where it is not.
 
-    `frequency` (n,) rad/s, ascending, and `damping_ratio` (n,) of n vibrations; `excited` (n,) their initial sizes,
+    `frequency` (n,) rad/s, ascending, and `damping_ratio` (n,) of n vibrations; `excited` (n,): initial sizes, no unit,
     relative to elastic forces. No step goes beyond an output at `times` (T,), s. Radau has to find its step size
     `starts` times; its steps have a `cost` in DOP853 steps.
     """

@@ -133,8 +133,8 @@ class Run:
     q: Array
     v: Array
     a: Array
-    multipliers: Array  # (T, constraint equations)
-    # (T, n_v) generalized forces of a prescribed shape; None where `multipliers` have all forces
+    multipliers: Array  # (T, constraint equations) N or N·m
+    # (T, n_v) generalized forces, SI, of a prescribed shape; None where `multipliers` have all forces
     required: Array | None = None
     # (T, k) by joint, N·m or N along its coordinates, of a controller or a replay
     commanded: Mapping[str, Array] = field(default_factory=dict)

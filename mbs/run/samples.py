@@ -48,7 +48,7 @@ def new_samples(times: Array, analysis: IntegratedAnalysis, size: int) -> _core.
 
 
 def reached_samples(samples: _core.Samples | None, time: Array) -> tuple[Array, Array] | None:
-    """Times (k,), s, and states (k, n), q and v, of samples up to the last output of `time` (T,), s; None if none."""
+    """Times (k,), s, and states (k, n_q + n_v) q, v, SI, of samples up to the end of `time` (T,), s; None if none."""
     if samples is None or not len(time):
         return None
     times = samples.times  # ascending
@@ -57,7 +57,7 @@ def reached_samples(samples: _core.Samples | None, time: Array) -> tuple[Array, 
 
 
 def some_of(times: Array, rates: Array, ends: Array, most: int) -> Indices:
-    """Numbers of about `most` of the samples at `times` (k,), s, and of those about the highest of `rates` (k, n).
+    """Numbers of about `most` samples at `times` (k,), s, and of those about the highest of `rates` (k, n), any unit.
 
     The first, the last, and those at the times `ends`, s, are among them.
     """

@@ -49,7 +49,7 @@ class Bounds:
 
 @struct
 class Posed:
-    """A tracking problem `asked`, its zero dynamics `linear`, and `breaks` (s), `coarse` ones for the least voltage.
+    """A tracking problem, its zero dynamics, `breaks` (N + 1,), s, and `coarse` ones for the least voltage.
 
     `around`: pre- and post-actuation, s.
     """

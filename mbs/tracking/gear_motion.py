@@ -159,7 +159,7 @@ class Shares(NamedTuple):
     """Largest shares of limits in a motion, with the times `peak_times` (motors,), s, of the largest torques."""
 
     voltage: float  # of `Weights.voltage` where patches have no limits
-    torques: Array  # (motors,), 0 of motors without a limit
+    torques: Array  # (motors,), no unit, 0 of motors without a limit
     peak_times: Array
 
 

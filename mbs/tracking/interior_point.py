@@ -28,7 +28,7 @@ SPREAD = 10.0  # of slack × z about their target, which no corrector changes
 
 @struct
 class Program:
-    """Quadratic program along a time axis, in unknowns x_0 … x_N of length s and z_k = (x_k, the first r of x_{k+1}).
+    """Quadratic program over time, any units, in unknowns x_0 … x_N (s,) and z_k = (x_k, the first r of x_{k+1}).
 
     min Σ_k ½ z_kᵀ H_k z_k + g_kᵀ z_k with F_k x_k + G_k x_{k+1} = c_k and C_k z_k ≤ d_k: H (N, s + r, s + r),
     g (N, s + r), F, G (N, e, s), c (N, e), C (N, i, s + r), d (N, i). `start`, `end`: R, e of R x = e at x_0 and x_N.
@@ -45,12 +45,12 @@ class Program:
     d: Array
 
     def z(self, x: Array) -> Array:
-        """All z_k (N, s + r) of x (N+1, s)."""
+        """All z_k (N, s + r) of x (N + 1, s), any unit."""
         return np.hstack([x[:-1], x[1:, : self.g.shape[1] - x.shape[1]]])
 
 
 class Minimum(NamedTuple):
-    """Solution x (N+1, s) of a `Program`, multipliers (N, i) ≥ 0 of C z ≤ d, and whether the method converged.
+    """Solution x (N + 1, s) of a `Program`, in its units, multipliers (N, i) ≥ 0 of C z ≤ d; whether it converged.
 
     `halfway`: slack, multipliers and all unknowns, x less that of the minimum, at an iteration inside the bounds.
     """

@@ -36,7 +36,7 @@ class Curves:
     """`count` voltages V(t), or path errors e(t), whose derivative of `order` is linear between `breaks` (N + 1,), s.
 
     On an interval they follow from this derivative at both ends, and from V and the lower derivatives at its start:
-    `places` (order + 2,) are the first numbers of these among the `width` unknowns z of an interval.
+    `places` (order + 2,) are the first numbers of these among the `width` unknowns z of an interval. SI units.
     """
 
     breaks: Array
@@ -62,7 +62,7 @@ class Curves:
         return np.stack([constant - last, last, *lower], axis=2)
 
     def by_z(self, xi: Array, derivative: int = 0) -> Array:
-        """Matrices (N, S, count, width) from the unknowns z to a derivative at shares ξ (S,) of intervals."""
+        """Matrices (N, S, count, width), SI, from the unknowns z to a derivative at shares ξ (S,) of intervals."""
         parts, each = self._parts(xi, derivative), np.arange(self.count)
         by_z = np.zeros((*parts.shape[:2], self.count, self.width))
         for k, place in enumerate(self.places):
@@ -70,7 +70,7 @@ class Curves:
         return by_z
 
     def squares(self, weights: Array, derivative: int) -> Array:
-        """Quadratic forms (N, width, width) of Σ weights |derivative|², with weights (N, 4) at the Gauss points."""
+        """Quadratic forms (N, width, width) of Σ weights |derivative|², weights (N, 4), SI, at Gauss points."""
         parts, each = self._parts(GAUSS.c, derivative), np.arange(self.count)
         squares = np.einsum("Ns,Nsa,Nsb->abN", weights, parts, parts)
         found = np.zeros((len(parts), self.width, self.width))
@@ -134,7 +134,7 @@ class Steps:
     effort: tuple[Array, Array, float]  # H, g, and the constant that the program leaves out
     unique, damping = UNIQUE, 0.0  # shares of the effort, and of sizes of steps, in the objective
     of_voltages: float | Array = 1.0  # (N,) times the share of the effort
-    rows: list[tuple[str, Array, Indices]]  # of inequalities: their kind, limits (i,), and whose they are (i,)
+    rows: list[tuple[str, Array, Indices]]  # of inequalities: kind, limits (i,), SI, and whose they are (i,)
 
     def __init__(self, asked: Transition, breaks: Array, tau_qs: Array, size: float) -> None:
         self.asked, self.breaks, self.h, self.tau_qs, self.size = asked, breaks, np.diff(breaks), tau_qs, size

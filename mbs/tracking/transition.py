@@ -54,7 +54,7 @@ class Tolerance:
 
 
 def rows_of_points(servo: Servo) -> Indices:
-    """Numbers of the constraint equations that prescribe coordinates of points, m."""
+    """Numbers (k,) of the k constraint equations that prescribe coordinates of points, m."""
     rows = servo.model.rows
     return np.flatnonzero([row.is_trajectory and row.kind == "point" and row.target is not None for row in rows])
 

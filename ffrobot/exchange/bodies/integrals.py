@@ -40,13 +40,13 @@ class ShapeIntegrals:
 
     mass: float  # m in kg
     first_moment: Array  # (3,) m c in kg·m
-    S_bar: Array  # (3, n) ∫ρ Φ dV = C_tᵀ
+    S_bar: Array  # (3, n) √kg, ∫ρ Φ dV = C_tᵀ
     inertia: Array  # (3, 3) J_0 about the origin, kg·m²
-    inertia_slope: Array  # (3, 3, n) J_l
-    spin: Array  # (3, n) ∫ρ x × Φ_l dV = C_r0ᵀ
+    inertia_slope: Array  # (3, 3, n) √kg·m, J_l
+    spin: Array  # (3, n) √kg·m, ∫ρ x × Φ_l dV = C_r0ᵀ
     spin_slope: Array  # (3, n, n) ∫ρ Φ_k × Φ_l dV of modes k, l at [l, k], no unit
     modal_mass: Array  # (n, n) M_e, no unit
-    centrifugal_slope: Array  # (6, n, n) ∫ρ Φ_lᵀ ω~ω~ Φ_k dV at [l, k], for ω_a ω_b of `PAIRS`; both orders where a ≠ b
+    centrifugal_slope: Array  # (6, n, n), no unit, ∫ρ Φ_lᵀ ω~ω~ Φ_k dV at [l, k], for ω_a ω_b of `PAIRS`, both orders
     # stiffness, damping: (n, n), of modal coordinates in m·√kg: 1/s² and 1/s
     stiffness: Array
     damping: Array

@@ -121,7 +121,7 @@ DARKEST = 0.6  # how bright a cell is that the light passes along
 
 
 def projected(points: Array, view: View) -> Array:
-    """Return page coordinates (…, 2) of points (…, 3) in parallel projection, m."""
+    """Return page coordinates (…, 2) of points (…, 3), both m, in parallel projection."""
     return np.stack([points @ view.right, points @ view.up], axis=-1)
 
 
