@@ -56,7 +56,7 @@ class PatchableLink:
 class Evaluation:
     """A set of patches: centers (count,), m, and the value of the criterion, which is maximized.
 
-    `reach` (modes,), without unit: controllability of each mode relative to that by the best single patch.
+    `reach` (modes,), no unit: controllability of each mode relative to that by the best single patch.
     """
 
     centers: Array

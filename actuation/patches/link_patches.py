@@ -60,7 +60,7 @@ class LinkPatches:
     bodies: Mapping[str, OnBody]  # by name, the link and, where it is divided, its pieces
     slowness: float  # √(ρA/EI) of the link, s/m²
     of_modes: Array  # (k, k) part of `static` by strains of the modes, F
-    # (n, n), without unit, from modal forces to the part that the equations keep; None: all of them
+    # (n, n), no unit, from modal forces to the part that the equations keep; None: all of them
     on_kept: Array | None = None
 
     @property

@@ -29,7 +29,7 @@ class ReachedModes:
     """Modes of the families that patches excite, among n modes of a link, in coordinates p' that decouple them."""
 
     rows: Indices  # (m,) numbers (from 0) of the modes of the modal body in these families
-    # (m, m) p of these modes from p', without unit: m_ff is the identity and K_ff diagonal; (m, fewer) where equations
+    # (m, m) p of these modes from p', no unit: m_ff is the identity and K_ff diagonal; (m, fewer) where equations
     # keep fewer, see `link_patches.on_kept_modes`
     T: Array
     stiffness: Array  # (m,) of the p', rad²/s²

@@ -27,7 +27,7 @@ class OrientationLaw:
     # what `functions` are: a rotation vector ψ, A = exp(ψ~) exp(reference~); roll, pitch and yaw about fixed axes; or
     # components of a direction of any length
     kind: Literal["rotation_vector", "rpy", "direction"]
-    functions: tuple[TimeFunction, ...]  # three functions of time, rad (direction: without unit)
+    functions: tuple[TimeFunction, ...]  # three functions of time, rad (direction: no unit)
     reference: Reference = (0.0, 0.0, 0.0)  # rotation vector (3,), rad
 
     @cached_property

@@ -25,7 +25,7 @@ CHUNK = 1024  # voltages, all on one way up or down, whose play operators are fo
 class Hysteresis:
     """Hysteresis of k patches, which act as under the effective voltage Σ w z of play operators z."""
 
-    weights: Array  # (MOST_PLAYS, k) w, without unit; 0 of spare operators
+    weights: Array  # (MOST_PLAYS, k) w, no unit; 0 of spare operators
     thresholds: Array  # (MOST_PLAYS, k) V, ascending from 0: z follows the voltage at this distance
 
     @property
@@ -41,7 +41,7 @@ class Hysteresis:
         return Hysteresis(weights, W * self.thresholds - np.cumsum(self.weights * self.thresholds, axis=0))
 
     def plays(self, z: Array, V: Array) -> Array:
-        """Return states (…, MOST_PLAYS, k) of play operators at voltages V (…, k) after states z (MOST_PLAYS, k), all V.
+        """Return states (…, MOST_PLAYS, k) of play operators at voltages V (…, k) after z (MOST_PLAYS, k), all V.
 
         Voltages of each patch only rise, or only fall.
         """

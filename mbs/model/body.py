@@ -28,7 +28,7 @@ class Stiffening:
     """Integrals of G (n, n), 1/(kg·m): bending moves points by −½ pᵀ G_l p along axis l; K > 0 stiffens under load."""
 
     K_s: Array  # (3, n, n) ∫ρ G_l dV, 1/m
-    K_x: Array  # (3, 3, n, n) ∫ρ x_k G_l dV at [k, l], without unit
+    K_x: Array  # (3, 3, n, n) ∫ρ x_k G_l dV at [k, l], no unit
     # (6, n, n) G of each interface along x, y, z, 1/(kg·m), and of its rotation about them, 1/(kg·m²)
     K_points: Mapping[str, Array]
     # (3, 3, n, n), no unit, part of S̄_kl by the extent of payloads: `Body.S_bar_kl` lacks it, as only equations
@@ -41,7 +41,7 @@ class Stiffening:
         return self.K_points.get(point, np.zeros((6, n, n)))
 
     def transformed(self, T: Array) -> "Stiffening":
-        """Return the stiffness in coordinates p' (m,) with p = T p', T (n, m) without unit."""
+        """Return the stiffness in coordinates p' (m,) with p = T p', T (n, m), no unit."""
         points = {name: T.T @ K @ T for name, K in self.K_points.items()}
         return Stiffening(T.T @ self.K_s @ T, T.T @ self.K_x @ T, MappingProxyType(points), T.T @ self.S_turned @ T)
 
@@ -136,7 +136,7 @@ class Body(Invariants):
     stiffness: Array  # K_ff (n,) in rad²/s²
     damping: Array  # D_ff (n, n) in 1/s
     points: Mapping[str, BodyPoint]  # its sections by name
-    modal_transform: Array  # (n_file, n) from p to modal coordinates of the file, without unit
+    modal_transform: Array  # (n_file, n) from p to modal coordinates of the file, no unit
     length: float | None = None  # of a link in m; None of a rigid body
     reduction: "Reduction | None" = None  # where it has fewer modes than its file
     attachment_modes: int = 0  # how many of the n, after all others, are static shapes of loads at interfaces
@@ -193,7 +193,7 @@ class Body(Invariants):
 
     @property
     def spin_slope(self) -> Array:
-        """H (3, n, n), skew, without unit: change of `spin` by deformation, h_a(p) = h0_a + pᵀH_a."""
+        """H (3, n, n), skew, no unit: change of `spin` by deformation, h_a(p) = h0_a + pᵀH_a."""
         S = self.S_bar_kl
         return np.array([S[1, 2] - S[2, 1], S[2, 0] - S[0, 2], S[0, 1] - S[1, 0]])
 
@@ -211,7 +211,7 @@ class Reduction:
 
 
 def transformed(body: Body, T: Array, stiffness: Array) -> Body:
-    """Return the body in p' with p = T p', T (n, m) without unit: m_ff = 1, K_ff = diag(`stiffness` (m,)), rad²/s²."""
+    """Return the body in p' with p = T p', T (n, m), no unit: m_ff = 1, K_ff = diag(`stiffness` (m,)), rad²/s²."""
     return replace(
         body,
         stiffness=stiffness,

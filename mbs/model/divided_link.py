@@ -20,7 +20,7 @@ INTERVALS = 32  # of a piece, over which strains are taken as constant
 
 @struct
 class DividedLink:
-    """Relation, without unit, of n modal coordinates of a link to N of its pieces, side by side from root to tip."""
+    """Relation, no unit, of n modal coordinates of a link to N of its pieces, side by side from root to tip."""
 
     bodies: tuple[str, ...]  # names of the pieces
     # (N, n) p of the pieces by p of the link. Its transpose makes modal forces on the link from those on the pieces
@@ -39,7 +39,7 @@ class LinkInPieces:
     pieces: tuple[ModalBody, ...]  # modal bodies of the pieces
     places: Mapping[str, str]  # "PIECE.POINT" of each point of the link by label
     points: Mapping[str, BodyPoint]  # these points in the whole link
-    to_own: Array  # (n_file, n), without unit: p (T, n_file) of the file times it are p (T, n) of the link's equations
+    to_own: Array  # (n_file, n), no unit: p (T, n_file) of the file times it are p (T, n) of the link's equations
 
 
 class PieceOfLink(NamedTuple):
@@ -61,7 +61,7 @@ def divided_link_of(link: ModalBody, spatial: Body, pieces: Sequence[PieceOfLink
 
 
 def spread_of(link: ModalBody, pieces: Sequence[tuple[float, ModalBody]]) -> Array:
-    """Return the matrix (N, n), without unit, from modes of a link to modes of its pieces, both of the files.
+    """Return the matrix (N, n), no unit, from modes of a link to modes of its pieces, both of the files.
 
     `pieces`: begin, m from the root, and modal body of each from root to tip. Bending planes, twist and stretch do not
     couple, so that their rigidities do not matter.

@@ -83,7 +83,7 @@ def _uncoupled(body: Body, m_ff: Array, added: Array | float = 0.0) -> Body:
 def uncoupling(M: Array, K: Array) -> tuple[Array, Array]:
     """Return T (n, n), no unit, with TᵀMT = 1, TᵀKT = diag(stiffness), and this stiffness (n,), rad²/s², of n modes.
 
-    Modes that M (n, n), without unit, and K (n, n), rad²/s², do not couple are not mixed, even at equal frequencies, so
+    Modes that M (n, n), no unit, and K (n, n), rad²/s², do not couple are not mixed, even at equal frequencies, so
     that they keep their families. Coupled ones are in ascending order in the places that they had.
     """
     T, stiffness = np.zeros_like(M), np.zeros(len(M))

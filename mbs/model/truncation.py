@@ -67,7 +67,7 @@ def loaded_points(scene: MechanismKeys, body: str) -> list[str]:
 
 
 def interface_loads(body: Body, loaded: Sequence[str]) -> Array:
-    """Return Bᵀ (n, loads), without unit: modal forces by a load along and about each axis at points, scaled to size 1.
+    """Return Bᵀ (n, loads), no unit: modal forces by a load along and about each axis at points, scaled to size 1.
 
     Loads under which nothing moves are left out: forces on a support, or along a link without axial modes.
     """

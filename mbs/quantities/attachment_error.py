@@ -26,7 +26,7 @@ JOLT = 0.01  # of the largest deformation: where more begins to ring at once, mo
 
 
 class Start(NamedTuple):
-    """Start of a run, coordinates divided by `Model.natural_sizes`, without unit.
+    """Start of a run, coordinates divided by `Model.natural_sizes`, no unit.
 
     M (n_v, n_v), kg·m², C_q (constraints, n_v), no unit, accelerations a (n_v,), 1/s². Of modes alone, else 0:
     `stiffness` (n_v,), J, `damping` (n_v, n_v), J·s, and `late` (n_v,), s², their estimated error per acceleration.

@@ -67,7 +67,7 @@ class SectionLoads:
     modal_force: Array  # (T, n) of both on the modes of the modal body file, N/√kg
 
     def shares(self, x: Array) -> Array:
-        """Return weights (s, g), without unit, of places for sections at x (s,), m: linear below one patch, else 0."""
+        """Return weights (s, g), no unit, of places for sections at x (s,), m: linear below one patch, else 0."""
         shares = np.zeros((len(x), len(self.x)))
         for k, (start, end) in enumerate(self.edges):
             own, under = np.flatnonzero(self.patch == k), np.flatnonzero((x >= start) & (x <= end))

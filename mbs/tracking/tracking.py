@@ -185,7 +185,7 @@ class TrackedPath(AroundPath):
     least_voltage_doubt: float  # V, estimated change by a finer mesh; infinite where it did not converge
     least_share: float  # least voltage as a share of the limits; NaN where no patch has any
     objective: Objective  # "least-voltage" in place of that of the scene beyond limits, and if no voltage is needed
-    cost: float  # the effort, without unit
+    cost: float  # the effort, no unit
     unmet: float  # largest residual modal force between Gauss points, relative to the largest elastic one
     bounds: Bounds | None  # V, by each zero of the zero dynamics; None where motors alone have no bounded motion
     # decrease of the objective per unit of a limit, by kind of limit, then by body or (torques) joint: `Tracked.prices`

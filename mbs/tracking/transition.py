@@ -130,7 +130,7 @@ class Tracked:
     converged: bool
     iterations: int
     share: float  # least share of limits (`objective` "least-…"), or of `Transition.weights` where none is set
-    cost: float  # the effort, without unit; 0 where it is not the objective
+    cost: float  # the effort, no unit; 0 where it is not the objective
     # decrease of effort or share per unit of limits, 0 of others: "voltage", "slew", "current" (m,), 1/V, s/V, 1/A,
     # "torque" (motors,), 1/(N·m) or 1/N, of points "error" and "curving" (its acceleration), 1/m, s²/m
     prices: dict[str, Array]
