@@ -145,12 +145,12 @@ def _not_empty(entries: tuple[T, ...]) -> tuple[T, ...]:
 
 
 def given_in(record: Record, keys: Iterable[str]) -> dict[str, Any]:
-    """Return the values of those `keys` of a record that are set."""
+    """The values of those `keys` of a record that are set."""
     return {key: value for key in keys if (value := getattr(record, key)) is not None}
 
 
 def one_of(record: Record, keys: tuple[str, ...]) -> str:
-    """Return the one key of `keys` that is set. Raises `ValueError` when there is none or more than one."""
+    """The one key of `keys` that is set. Raises `ValueError` when there is none or more than one."""
     given = [*given_in(record, keys)]
     if len(given) != 1:
         raise ValueError(f"expected exactly one of the keys {quoted(keys)}, found {quoted(given)}")
@@ -158,7 +158,7 @@ def one_of(record: Record, keys: tuple[str, ...]) -> str:
 
 
 def only(record: Record, subject: str, allowed: tuple[str, ...], optional: tuple[str, ...]) -> list[str]:
-    """Return the `optional` keys that are set. Raises `ValueError` for none, or some not `allowed` with `subject`."""
+    """The `optional` keys that are set. Raises `ValueError` for none, or some not `allowed` with `subject`."""
     given = [*given_in(record, optional)]
     if not given or not set(given) <= set(allowed):
         raise ValueError(f'expected the keys {quoted(allowed)} with "{subject}", found {quoted(given)}')
@@ -200,7 +200,7 @@ class Reference:
 
 
 def loaded_reference(key: str, side: str | None) -> list[Reference]:
-    """Return the reference to a point (or body frame) where forces act; empty for the ground, or without a `side`."""
+    """The reference to a point (or body frame) where forces act; empty for the ground, or without a `side`."""
     return [] if side is None or side == GROUND else [Reference(key, side, loaded=True)]
 
 
@@ -218,7 +218,7 @@ class Referring(Record):
 
 
 def body_of(side: str) -> str:
-    """Return the body of "BODY.POINT" or "BODY"; "ground" for the ground."""
+    """The body of "BODY.POINT" or "BODY"; "ground" for the ground."""
     return side.partition(".")[0]
 
 

@@ -45,7 +45,7 @@ _compiled = list[object]()  # machine code must outlive the scenes that know its
 
 
 def called(function: Callable[..., object], t: float, *arguments: object) -> Array:
-    """Return the numbers, of any shape and unit, of a user's function; its errors get a note with its name and t (s).
+    """The numbers, of any shape and unit, of a user's function; its errors get a note with its name and t (s).
 
     Raises `InputError` where it returns something else than numbers.
     """

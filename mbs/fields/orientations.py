@@ -32,17 +32,17 @@ class OrientationLaw:
 
     @cached_property
     def in_core(self) -> _core.TurningLaw:
-        """Return the law as a record of the core, which evaluates it at any time, with ω (rad/s) and α (rad/s²)."""
+        """The law as a record of the core, which evaluates it at any time, with ω (rad/s) and α (rad/s²)."""
         kind, reference = getattr(_core.OrientationKind, self.kind), exponential(np.array(self.reference))
         return _core.TurningLaw(kind, list(self.functions), reference)
 
     def sample(self, times: Array) -> Array:
-        """Return triads A (T, 3, 3), unit columns, at `times` (T,), s; for a direction the smallest turn of z to it."""
+        """Triads A (T, 3, 3), unit columns, at `times` (T,), s; for a direction the smallest turn of z to it."""
         return self.in_core.sample(times)[0].reshape(-1, 3, 3)
 
 
 def orientation_of(table: Waypoints) -> tuple[Array, Reference]:
-    """Return rotation vectors (T, 3), rad, of columns qw, qx, qy, qz from their mean orientation, and that of the mean.
+    """Rotation vectors (T, 3), rad, of columns qw, qx, qy, qz from their mean orientation, and that of the mean.
 
     Splines of these vectors are smooth; interpolated quaternions would jump in angular velocity. Raises `InputError`
     for a row that is no unit quaternion, and for orientations too far apart for one rotation vector.
@@ -56,7 +56,7 @@ def orientation_of(table: Waypoints) -> tuple[Array, Reference]:
 
 
 def about_their_middle(A: Array, each: str) -> tuple[Array, Reference]:
-    """Return rotation vectors (T, 3), rad, of triads A (T, 3, 3) from their mean orientation, and that of the mean.
+    """Rotation vectors (T, 3), rad, of triads A (T, 3, 3) from their mean orientation, and that of the mean.
 
     With two triads the straight line between their vectors is a rotation about a fixed axis. Raises `InputError`, which
     calls a triad `each` and a number, where orientations are too far apart.

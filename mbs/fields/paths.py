@@ -43,7 +43,7 @@ class Piecewise:
         return Piecewise(factor * self.breaks + delay, self.coefficients * powers[None, :, None])
 
     def along(self, change: Array) -> "Piecewise":
-        """Return the motion of one component times a vector `change` (n,), any unit."""
+        """The motion of one component times a vector `change` (n,), any unit."""
         return Piecewise(self.breaks, self.coefficients * change)
 
     @property
@@ -57,7 +57,7 @@ class Piecewise:
         return shifted(self.coefficients[-1], self.end - self.breaks[-2])[-1]
 
     def sample(self, times: Array, derivative: int = 0) -> Array:
-        """Return derivative no. k (T, n), m or rad per sᵏ, at `times` (T,), s; at jumps that of the following piece."""
+        """Derivative no. k (T, n), m or rad per sᵏ, at `times` (T,), s; at jumps that of the following piece."""
         t = np.clip(times, self.begin, self.end)
         piece = np.clip(np.searchsorted(self.breaks, t, side="right") - 1, 0, len(self.coefficients) - 1)
         powers = range(self.coefficients.shape[1] - 1, derivative - 1, -1)
@@ -77,7 +77,7 @@ class Piecewise:
 
 
 def shifted(coefficients: Array, s: Array | float) -> Array:
-    """Return polynomials in x (…, order, n), any unit, highest power first, in powers of x − s, s (…) (Horner)."""
+    """Polynomials in x (…, order, n), any unit, highest power first, in powers of x − s, s (…) (Horner)."""
     moved, s = coefficients.copy(), np.asarray(s)[..., None]
     for last in range(moved.shape[-2], 1, -1):
         for k in range(1, last):
@@ -86,7 +86,7 @@ def shifted(coefficients: Array, s: Array | float) -> Array:
 
 
 def superposed(motions: Sequence[Piecewise], weights: Sequence[float] | None = None) -> Piecewise:
-    """Return Σ weight · motion (weights 1 where not given); each motion rests before its begin and after its end."""
+    """Σ weight · motion (weights 1 where not given); each motion rests before its begin and after its end."""
     breaks = merged(np.concatenate([motion.breaks for motion in motions]))
     middles = 0.5 * (breaks[1:] + breaks[:-1])
     order = max(motion.coefficients.shape[1] for motion in motions)
@@ -105,7 +105,7 @@ def superposed(motions: Sequence[Piecewise], weights: Sequence[float] | None = N
 
 
 def merged(instants: Array) -> Array:
-    """Return `instants` (any,), s, ascending; those that differ by round-off are one."""
+    """`instants` (any,), s, ascending; those that differ by round-off are one."""
     every = np.unique(instants)
     return every[np.append(True, np.diff(every) > SAME_TIME * np.ptp(every))]
 
@@ -127,7 +127,7 @@ class PathLimits(NamedTuple):
 
 
 def law_in(duration: float, profile: Profile, smoothness: int) -> Piecewise:
-    """Return the law of motion s(t) from 0 to 1 in `duration` (s); `smoothness`: number of continuous derivatives."""
+    """The law of motion s(t) from 0 to 1 in `duration` (s); `smoothness`: number of continuous derivatives."""
     if profile == "rest-to-rest":
         return polynomial_law(smoothness).moved(duration)
     times = HALF ** np.arange(smoothness + 1)
@@ -135,7 +135,7 @@ def law_in(duration: float, profile: Profile, smoothness: int) -> Piecewise:
 
 
 def law_within(distance: float, limits: PathLimits, profile: Profile, smoothness: int) -> Piecewise:
-    """Return the fastest law s(t) from 0 to 1 with which a motion over `distance` (m or rad) satisfies `limits`.
+    """The fastest law s(t) from 0 to 1 with which a motion over `distance` (m or rad) satisfies `limits`.
 
     `smoothness`: number of continuous derivatives. Raises `ValueError` where parts of it are too short beside others.
     """
@@ -160,7 +160,7 @@ def check_durations(durations: Sequence[float], total: float) -> None:
 
 
 def averaging_times(distance: float, limits: PathLimits) -> tuple[float, float, float]:
-    """Return averaging times T₁ ≥ T₂ + T₃, T₂ ≥ T₃ (s) of the fastest motion over `distance` (m, rad) within `limits`.
+    """Averaging times T₁ ≥ T₂ + T₃, T₂ ≥ T₃ (s) of the fastest motion over `distance` (m, rad) within `limits`.
 
     T₃ = 0 without a limit of jerk.
     """
@@ -173,7 +173,7 @@ def averaging_times(distance: float, limits: PathLimits) -> tuple[float, float, 
 
 
 def averaged_step(times: Array) -> Piecewise:
-    """Return a step from 0 to 1, averaged over each of the `times` (m + 1,), s: with m continuous derivatives.
+    """A step from 0 to 1, averaged over each of the `times` (m + 1,), s: with m continuous derivatives.
 
     The highest derivative is constant between the sums of some of the times; the others follow by integration.
     """
@@ -194,7 +194,7 @@ def averaged_step(times: Array) -> Piecewise:
 
 
 def polynomial_law(smoothness: int) -> Piecewise:
-    """Return s(t) ∝ ∫ t^m (1 − t)^m dt on [0, 1], m = `smoothness`: as many derivatives vanish at both ends.
+    """s(t) ∝ ∫ t^m (1 − t)^m dt on [0, 1], m = `smoothness`: as many derivatives vanish at both ends.
 
     It has two pieces against the round-off of large coefficients at its end.
     """
@@ -203,7 +203,7 @@ def polynomial_law(smoothness: int) -> Piecewise:
 
 
 def law_peak(smoothness: int, order: int) -> float:
-    """Return the largest size of the derivative of this `order` of `polynomial_law` on [0, 1]."""
+    """The largest size of the derivative of this `order` of `polynomial_law` on [0, 1]."""
     derivative = np.polyder(_polynomial(smoothness), order)
     turns = np.roots(np.polyder(derivative))
     inside = turns.real[(np.abs(turns.imag) < 1e-9) & (turns.real > 0.0) & (turns.real < 1.0)]
@@ -237,7 +237,7 @@ class Legs:
 
 
 def path_of(legs: Legs) -> Piecewise:
-    """Return the motion along `legs`; where these overlap, all are slowed down equally to stay within the limits."""
+    """The motion along `legs`; where these overlap, all are slowed down equally to stay within the limits."""
     motion = _joined(legs)
     if not legs.blend or legs.durations is not None:
         return motion
@@ -288,7 +288,7 @@ class Impulse(NamedTuple):
 
 
 def impulses(kind: Kind, frequency: float, damping_ratio: float) -> list[Impulse]:
-    """Return the impulses of a shaper for vibrations of one undamped `frequency`, Hz.
+    """The impulses of a shaper for vibrations of one undamped `frequency`, Hz.
 
     "zv" leaves no vibration of that frequency (Singer and Seering 1990, J. Dyn. Syst. Meas. Control 112); "zvd" none,
     with zero derivative by frequency; "ei" at most 5 % over a wider range (Singhose, Seering and Singer 1994, J. Mech.
@@ -302,5 +302,5 @@ def impulses(kind: Kind, frequency: float, damping_ratio: float) -> list[Impulse
 
 
 def shaped(motion: Piecewise, sequence: list[Impulse]) -> Piecewise:
-    """Return the motion shaped by one `sequence` of impulses; it is longer by the last delay."""
+    """The motion shaped by one `sequence` of impulses; it is longer by the last delay."""
     return superposed([motion.moved(delay=impulse.delay) for impulse in sequence], [i.share for i in sequence])

@@ -27,7 +27,7 @@ def is_planar(info: ValidationInfo) -> bool:
 
 
 def keys_here(record: Record, keys: Iterable[str], info: ValidationInfo) -> tuple[str, ...]:
-    """Return those of a record's `keys` that exist in scenes of the space being read."""
+    """Those of a record's `keys` that exist in scenes of the space being read."""
     fields = type(record).model_fields
     return tuple(key for key in keys if is_key(fields[key], space_of(info)))
 
@@ -88,13 +88,13 @@ class TaggedInPlane:
 
 
 def place(x_y: Sequence[float]) -> tuple[float, float, float]:
-    """Return the position (x, y), m, of the plane in 3D."""
+    """The position (x, y), m, of the plane in 3D."""
     x, y = x_y
     return x, y, 0.0
 
 
 def inertia_about_z(J: float) -> tuple[float, float, float]:
-    """Return moments about x, y, z (kg·m²) of a body with J about z; x and y do not matter in the plane."""
+    """Moments about x, y, z (kg·m²) of a body with J about z; x and y do not matter in the plane."""
     return ACROSS * J, ACROSS * J, J
 
 

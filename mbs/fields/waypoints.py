@@ -61,7 +61,7 @@ class Waypoints:
     remarks: tuple[str, ...] = ()
 
     def of_joint(self, joint: str) -> "Waypoints":
-        """Return the column of a joint as "value"; the whole table if no column has one of its names (`OF_A_JOINT`).
+        """The column of a joint as "value"; the whole table if no column has one of its names (`OF_A_JOINT`).
 
         Raises `ValueError` where two topics have the joint.
         """
@@ -131,7 +131,7 @@ class Recorded:
     units: tuple[str, ...] = ()
 
     def waypoints(self) -> Waypoints:
-        """Return the rows as waypoints with remarks on odd entries; a row that repeats the one before is left out.
+        """The rows as waypoints with remarks on odd entries; a row that repeats the one before is left out.
 
         Raises `InputError` for times that do not increase, and fewer than two rows.
         """
@@ -154,7 +154,7 @@ class Recorded:
 
 
 def column_of(columns: Sequence[str], joint: str) -> int | None:
-    """Return the index of a joint's column or None (see `OF_A_JOINT`). Raises `ValueError` if two topics have one."""
+    """The index of a joint's column or None (see `OF_A_JOINT`). Raises `ValueError` if two topics have one."""
     for pattern in OF_A_JOINT:
         name = pattern.format(joint)
         ends = (f"/{name}",) if name != pattern else ()
@@ -283,7 +283,7 @@ def _accelerations(times: Array, values: Array) -> Array:
 
 
 def difference_quotients(times: Array, values: Array) -> tuple[Array, Array]:
-    """Return midpoints (T − 1,) of `times` (T,), s, and mean rates (T − 1, n), per s, of `values` (T, n), any unit."""
+    """Midpoints (T − 1,) of `times` (T,), s, and mean rates (T − 1, n), per s, of `values` (T, n), any unit."""
     return (times[1:] + times[:-1]) / 2, np.diff(values, axis=0) / np.diff(times)[:, None]
 
 
@@ -308,7 +308,7 @@ def _read_table(path: Path) -> tuple[list[str], Array, Indices]:
 
 
 def numbers_of(path: Path, line: int, row: list[str], count: int) -> list[float]:
-    """Return the `count` numbers of a row of `path`. Raises `InputError` for text, another count, or too large ones."""
+    """The `count` numbers of a row of `path`. Raises `InputError` for text, another count, or too large ones."""
     try:
         numbers = [float(cell) for cell in row]
     except ValueError:
@@ -321,7 +321,7 @@ def numbers_of(path: Path, line: int, row: list[str], count: int) -> list[float]
 
 
 def interpolated(nodes: Array, values: Array, degree: int = 5, at_rest: bool = True) -> Piecewise:
-    """Return the spline of a degree through `values` (T, n), of any unit, at `nodes` (T,), s.
+    """The spline of a degree through `values` (T, n), of any unit, at `nodes` (T,), s.
 
     With `at_rest` its first two derivatives vanish at both ends.
     """
@@ -335,7 +335,7 @@ def interpolated(nodes: Array, values: Array, degree: int = 5, at_rest: bool = T
 
 
 def spline(nodes: Array, values: Array, degree: int = 5, at_rest: bool = False) -> list[TimeFunction]:
-    """Return a function of time for each column of `values` (N, columns), of any unit, at `nodes` (N,), s.
+    """A function of time for each column of `values` (N, columns), of any unit, at `nodes` (N,), s.
 
     They are `interpolated`, or constants if N is 1.
     """

@@ -52,7 +52,7 @@ class StiffnessSteps(Record):
 
 
 def stiffer(stiffness: float | StiffnessSteps, factor: float) -> float | StiffnessSteps:
-    """Return the key `stiffness` of a spring with `factor` times the slopes, its steps at the same torques."""
+    """The key `stiffness` of a spring with `factor` times the slopes, its steps at the same torques."""
     if not isinstance(stiffness, StiffnessSteps):
         return factor * stiffness
     return stiffness.model_copy(update={"values": tuple(factor * K for K in stiffness.values)})
@@ -80,15 +80,15 @@ class TwistSpring:
         return tuple(np.cumsum(steps).tolist())
 
     def moment(self, twist: Array) -> Array:
-        """Return torques (…,), N·m, of twists (…,), rad."""
+        """Torques (…,), N·m, of twists (…,), rad."""
         return _piecewise(twist, self.slopes, self.knots)
 
     def twist(self, moment: Array) -> Array:
-        """Return twists (…,), rad, under torques (…,), N·m."""
+        """Twists (…,), rad, under torques (…,), N·m."""
         return _piecewise(moment, tuple(1.0 / k for k in self.slopes), self.torques)
 
     def slope(self, twist: Array) -> Array:
-        """Return stiffness (…,), N·m/rad, at twists (…,), rad."""
+        """Stiffness (…,), N·m/rad, at twists (…,), rad."""
         return np.array(self.slopes)[np.searchsorted(self.knots, np.abs(twist))]
 
 
@@ -121,7 +121,7 @@ class Friction:
         return self.viscous * rate + self.coulomb * np.tanh(rate / self.speed)
 
     def damping(self, *, is_at_rest: bool) -> float:
-        """Return c, at rest c + τ_c/γ̇_s, N·m·s/rad or N·s/m."""
+        """c, at rest c + τ_c/γ̇_s, N·m·s/rad or N·s/m."""
         return self.viscous + is_at_rest * self.coulomb / self.speed
 
 
@@ -211,7 +211,7 @@ class JointRecord(Record):
 
     @classmethod
     def refuse_key(cls, key: str, others: Sequence[RecordType]) -> str:
-        """Return the message for a `key` that only joints of types `others` have; empty without any."""
+        """The message for a `key` that only joints of types `others` have; empty without any."""
         if not others:
             return ""
         having = " or ".join(other.type_name() for other in others if issubclass(other, JointRecord))
@@ -249,15 +249,15 @@ class JointRecord(Record):
         return of_rpy(*self.rpy)
 
     def triads(self) -> tuple[Array, Array]:
-        """Return the joint's axes (3, 3), unit columns, on its first and its second side, in axes of the sections."""
+        """The joint's axes (3, 3), unit columns, on its first and its second side, in axes of the sections."""
         return np.eye(3), self.orientation.T
 
     def turned_around(self, coordinates: Array) -> Array:
-        """Return coordinates (…, k), rad or m, of the first side relative to the second, from those of the joint."""
+        """Coordinates (…, k), rad or m, of the first side relative to the second, from those of the joint."""
         return -coordinates
 
     def rate_turned_around(self, coordinates: Array, rate: Array) -> Array:
-        """Return rates (…, k), rad/s or m/s, of coordinates of the first side in the second, by those of the joint."""
+        """Rates (…, k), rad/s or m/s, of coordinates of the first side in the second, by those of the joint."""
         return self.turned_around(rate)
 
     def state(self, coordinates: Array) -> Array:
@@ -269,7 +269,7 @@ class JointRecord(Record):
         return self.state(rates)
 
     def coordinates(self, q: Array) -> Array:
-        """Return coordinates (…, k) in the scene's order from the core's q (…, q_count), rad or m; or rates from v."""
+        """Coordinates (…, k) in the scene's order from the core's q (…, q_count), rad or m; or rates from v."""
         return q
 
     # Joints that can have motors or gears override these.
@@ -388,7 +388,7 @@ class AxialJoint(MovingJoint):
     """Axis of motion in the axes of the first of `between` (ground: global), of any length."""
 
     def triads(self) -> tuple[Array, Array]:
-        """Return triads (3, 3) of first and second side with z along the axis, columns, in axes of the sections."""
+        """Triads (3, 3) of first and second side with z along the axis, columns, in axes of the sections."""
         first = smallest_turn(np.array(self.axis))
         return first, self.orientation.T @ first
 

@@ -52,7 +52,7 @@ class PrismaticJoint(GearedJoint):
 
     @classmethod
     def demand_key(cls, key: str) -> str:
-        """Return the message for a missing axis; empty for other keys."""
+        """The message for a missing axis; empty for other keys."""
         return "expected an axis with a direction in a prismatic joint, found none" if key == "axis" else ""
 
     units = ("m",)
@@ -97,7 +97,7 @@ class CylindricalJoint(AxialJoint):
         return coordinates[..., ::-1]
 
     def coordinates(self, q: Array) -> Array:
-        """Return coordinates (…, 2) of the scene, rad and m: angle, displacement, from q (…, 2), m and rad."""
+        """Coordinates (…, 2) of the scene, rad and m: angle, displacement, from q (…, 2), m and rad."""
         return q[..., ::-1]
 
 
@@ -133,14 +133,14 @@ class UniversalJoint(AxialJoint):
         return self
 
     def triads(self) -> tuple[Array, Array]:
-        """Return triads (3, 3) of first and second side, columns: x along the first axis, y along the second."""
+        """Triads (3, 3) of first and second side, columns: x along the first axis, y along the second."""
         x, y = unit(np.array(self.axis)), unit(self.orientation @ self.second_axis)
         z = unit(np.cross(x, y))
         first = np.stack([x, np.cross(z, x), z], axis=1)
         return first, self.orientation.T @ first
 
     def turned_around(self, coordinates: Array) -> Array:
-        """Return coordinates (…, 2), rad, of the reversed joint: both negative, the second first."""
+        """Coordinates (…, 2), rad, of the reversed joint: both negative, the second first."""
         return -coordinates[..., ::-1]
 
 
@@ -157,11 +157,11 @@ class SphericalJoint(JointRecord):
     locates: ClassVar[bool] = False  # a loop is best cut here: three equations, no angle
 
     def state(self, coordinates: Array) -> Array:
-        """Return the quaternion (…, 4) of a rotation vector (…, 3), rad."""
+        """The quaternion (…, 4) of a rotation vector (…, 3), rad."""
         return quaternions(exponential(coordinates))
 
     def velocity(self, rates: Array) -> Array:
-        """Return the angular velocity (3,), rad/s, in axes of the second body, by `rates` in those of the joint."""
+        """The angular velocity (3,), rad/s, in axes of the second body, by `rates` in those of the joint."""
         return self.orientation @ rates
 
 
@@ -180,13 +180,13 @@ class PlanarJoint(AxialJoint):
     along = (Along("slide", 0), Along("slide", 1), Along("turn", 2))
 
     def turned_around(self, coordinates: Array) -> Array:
-        """Return coordinates (…, 3), m, m, rad, of the reversed joint: first side in axes of the second."""
+        """Coordinates (…, 3), m, m, rad, of the reversed joint: first side in axes of the second."""
         x, y, angle = np.moveaxis(coordinates, -1, 0)
         c, s = np.cos(angle), np.sin(angle)
         return np.stack([-(c * x + s * y), s * x - c * y, -angle], axis=-1)
 
     def rate_turned_around(self, coordinates: Array, rate: Array) -> Array:
-        """Return rates (…, 3), m/s, m/s, rad/s, of the reversed joint; its axes of displacement rotate, too."""
+        """Rates (…, 3), m/s, m/s, rad/s, of the reversed joint; its axes of displacement rotate, too."""
         X, Y, _ = np.moveaxis(self.turned_around(coordinates), -1, 0)
         turn = rate[..., 2]
         x, y, _ = np.moveaxis(self.turned_around(np.concatenate([rate[..., :2], coordinates[..., 2:]], axis=-1)), -1, 0)
@@ -225,15 +225,15 @@ class FreeJoint(JointRecord):
     locates: ClassVar[bool] = False
 
     def state(self, coordinates: Array) -> Array:
-        """Return position (m) and quaternion, (…, 7), from position (m) and rotation vector (rad), (…, 6)."""
+        """Position (m) and quaternion, (…, 7), from position (m) and rotation vector (rad), (…, 6)."""
         return np.concatenate([coordinates[..., :3], quaternions(exponential(coordinates[..., 3:]))], axis=-1)
 
     def velocity(self, rates: Array) -> Array:
-        """Return velocity (m/s) in axes of the first side, angular velocity (rad/s) in those of the second, (6,)."""
+        """Velocity (m/s) in axes of the first side, angular velocity (rad/s) in those of the second, (6,)."""
         return np.concatenate([rates[:3], self.orientation @ rates[3:]])
 
     def turned_around(self, coordinates: Array) -> Array:
-        """Return position (m) and rotation vector (rad) of the first side, (…, 6), in axes of the second."""
+        """Position (m) and rotation vector (rad) of the first side, (…, 6), in axes of the second."""
         C = exponential(coordinates[..., 3:])
         back = -np.einsum("...ij,...i->...j", C, coordinates[..., :3])
         return np.concatenate([back, -coordinates[..., 3:]], axis=-1)

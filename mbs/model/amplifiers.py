@@ -41,7 +41,7 @@ class Hysteresis:
         return Hysteresis(weights, W * self.thresholds - np.cumsum(self.weights * self.thresholds, axis=0))
 
     def plays(self, z: Array, V: Array) -> Array:
-        """Return states (…, MOST_PLAYS, k) of play operators at voltages V (…, k) after z (MOST_PLAYS, k), all V.
+        """States (…, MOST_PLAYS, k) of play operators at voltages V (…, k) after z (MOST_PLAYS, k), all V.
 
         Voltages of each patch only rise, or only fall.
         """
@@ -49,11 +49,11 @@ class Hysteresis:
         return np.clip(z, V - self.thresholds, V + self.thresholds)
 
     def acting(self, plays: Array) -> Array:
-        """Return effective voltages Σ w z (…, k), V, for z = `plays` (…, MOST_PLAYS, k), V."""
+        """Effective voltages Σ w z (…, k), V, for z = `plays` (…, MOST_PLAYS, k), V."""
         return (self.weights * plays).sum(axis=-2)
 
     def output(self, V: Array) -> Array:
-        """Return effective voltages (T, k), V, of voltages V (T, k), V, linear between, from rest."""
+        """Effective voltages (T, k), V, of voltages V (T, k), V, linear between, from rest."""
         acting, z = np.empty_like(V), np.zeros_like(self.weights)
         turns = np.flatnonzero(np.diff(np.sign(np.diff(V, axis=0)), axis=0).any(axis=1)) + 2
         begins = np.union1d(turns, np.arange(0, len(V), CHUNK))
@@ -120,12 +120,12 @@ class Amplifiers:
         return Hysteresis(weights, inverse.thresholds)
 
     def unlimited(self) -> "Amplifiers":
-        """Return the same amplifiers without limits."""
+        """The same amplifiers without limits."""
         none = np.full_like(self.slew, np.inf)
         return replace(self, range=np.stack([-none, none]), slew=none, current=none)
 
     def advance(self, h: float, now: Array, wanted: tuple[Array, Array], strain: Array) -> tuple[Array, Array]:
-        """Return voltages (k,), V, after a step `h` (s) from those `now` (k,), and their means over it.
+        """Voltages (k,), V, after a step `h` (s) from those `now` (k,), and their means over it.
 
         `wanted`, two of (k,), V, is linear in the step, from the first to the second; `strain` (k,), A: current Φ_Vᵀ ṗ.
         """
@@ -151,7 +151,7 @@ class Amplifiers:
         return kept, np.where(kept == after, mean, (now + kept) / 2)
 
     def output(self, times: Array, wanted: Array, strain: Array) -> Array:
-        """Return effective voltages (T, k), V, at `times` (T,), s, of `wanted` (T, k), linear between.
+        """Effective voltages (T, k), V, at `times` (T,), s, of `wanted` (T, k), linear between.
 
         `strain` (T, k), A: current by the strain of the patches, Φ_Vᵀ ṗ.
         """
@@ -165,7 +165,7 @@ class Amplifiers:
 
 
 def joined(links: Iterable[Amplifiers]) -> Amplifiers:
-    """Return the amplifiers of all patches of `links`, in this order."""
+    """The amplifiers of all patches of `links`, in this order."""
     none = {field.name: np.zeros(0) for field in fields(Amplifiers)}
     none |= {"range": np.zeros((2, 0)), "plays": np.zeros((2, MOST_PLAYS, 0)), "capacitance": np.zeros((0, 0))}
     parts = [none, *map(vars, links)]

@@ -36,12 +36,12 @@ class Stiffening:
     S_turned: Array
 
     def at(self, point: str) -> Array:
-        """Return stiffness (6, n, n), 1/s² per N and N·m, of loads along and about x, y, z at a point; 0 if unknown."""
+        """Stiffness (6, n, n), 1/s² per N and N·m, of loads along and about x, y, z at a point; 0 if unknown."""
         n = self.K_s.shape[-1]
         return self.K_points.get(point, np.zeros((6, n, n)))
 
     def transformed(self, T: Array) -> "Stiffening":
-        """Return the stiffness in coordinates p' (m,) with p = T p', T (n, m), no unit."""
+        """The stiffness in coordinates p' (m,) with p = T p', T (n, m), no unit."""
         points = {name: T.T @ K @ T for name, K in self.K_points.items()}
         return Stiffening(T.T @ self.K_s @ T, T.T @ self.K_x @ T, MappingProxyType(points), T.T @ self.S_turned @ T)
 
@@ -77,7 +77,7 @@ class Stiffening:
 
 
 def stiffening_of(body: ModalBody, *, is_planar: bool) -> Stiffening | None:
-    """Return the geometric stiffness in a modal body; None if the file lacks what 3D or planar motion needs.
+    """The geometric stiffness in a modal body; None if the file lacks what 3D or planar motion needs.
 
     It follows from K of d'Alembert loads (theory.md, Eq. 52).
     """
@@ -211,7 +211,7 @@ class Reduction:
 
 
 def transformed(body: Body, T: Array, stiffness: Array) -> Body:
-    """Return the body in p' with p = T p', T (n, m), no unit: m_ff = 1, K_ff = diag(`stiffness` (m,)), rad²/s²."""
+    """The body in p' with p = T p', T (n, m), no unit: m_ff = 1, K_ff = diag(`stiffness` (m,)), rad²/s²."""
     return replace(
         body,
         stiffness=stiffness,
@@ -233,7 +233,7 @@ def transformed(body: Body, T: Array, stiffness: Array) -> Body:
 
 
 def scaled(body: Body, *, mass: float = 1.0, stiffness: float = 1.0) -> Body:
-    """Return the body with its mass and stiffness times factors `mass` and `stiffness`, at the same damping ratios."""
+    """The body with its mass and stiffness times factors `mass` and `stiffness`, at the same damping ratios."""
     of_mass = ("mass", "first_moment", "second_moment", "S_bar", "I_bar", "S_bar_kl", "J_spin", "h_spin", "S_spin")
     damping = body.damping * (mass * stiffness) ** 0.5
     heavier = replace(body, damping=damping, **{key: mass * getattr(body, key) for key in of_mass})
@@ -332,7 +332,7 @@ class BentSection(NamedTuple):
 
 
 def bent_section(body: Body, point: str, p: Array) -> BentSection:
-    """Return the section `point` of a body bent by p (…, n), √kg·m, in body axes."""
+    """The section `point` of a body bent by p (…, n), √kg·m, in body axes."""
     at = body.points[point]
     u, phi = at.position + p @ at.translation.T, p @ at.rotation.T
     if body.stiffening is None:
@@ -342,12 +342,12 @@ def bent_section(body: Body, point: str, p: Array) -> BentSection:
 
 
 def orientation(tool: Tool) -> Array:
-    """Return the axes (3, 3) of a tool, unit columns, in body axes."""
+    """The axes (3, 3) of a tool, unit columns, in body axes."""
     return about(2, tool.angle) @ of_rpy(*tool.rpy)
 
 
 def with_tool(body: Body, tool: Tool) -> Body:
-    """Return the body with a tool as one more point, at d from a section: bending moves it by Φp + φ × d, φ = Φ_r p.
+    """The body with a tool as one more point, at d from a section: bending moves it by Φp + φ × d, φ = Φ_r p.
 
     Geometric stiffness adds ½ φ × (φ × d): see `Stiffening.with_tool`.
     """

@@ -76,7 +76,7 @@ def _path_rows(scene: MechanismScene, tree: KinematicTree, path: Trajectory) -> 
 
 
 def row_of_joint(tree: KinematicTree, joint: JointRecord, owner: str, target: TimeFunction) -> ConstraintRow:
-    """Return the equation, of `owner`, by which a joint with one coordinate, in a tree or cut, follows `target`."""
+    """The equation, of `owner`, by which a joint with one coordinate, in a tree or cut, follows `target`."""
     if joint.name not in tree.carried:
         return replace(cut_row(tree, joint), owner=owner, is_trajectory=True, target=target)
     node = tree.nodes[tree.carried[joint.name]]
@@ -109,7 +109,7 @@ ALONG = 1e-12  # of the largest rotation of modes: round-off of those across an 
 
 
 def with_coordinates_of_frames(tree: KinematicTree) -> KinematicTree:
-    """Return the tree with angles between frames in revolute joints where modes turn sections about the axis alone."""
+    """The tree with angles between frames in revolute joints where modes turn sections about the axis alone."""
     changed, joints = copy.copy(tree), (*(node.joint for node in tree.nodes), *tree.loops)
     changed.on_frames = frozenset(
         joint.name

@@ -51,7 +51,7 @@ class PieceOfLink(NamedTuple):
 
 
 def divided_link_of(link: ModalBody, spatial: Body, pieces: Sequence[PieceOfLink]) -> DividedLink:
-    """Return the relation of a link and its pieces in coordinates of their equations (`spatial`: the link's)."""
+    """The relation of a link and its pieces in coordinates of their equations (`spatial`: the link's)."""
     of_file = [_shape_in_piece(link, piece.start, piece.modal) for piece in pieces]
     own = [np.linalg.pinv(piece.spatial.modal_transform) @ p for piece, p in zip(pieces, of_file, strict=True)]
     spread = np.vstack(own) @ spatial.modal_transform
@@ -61,7 +61,7 @@ def divided_link_of(link: ModalBody, spatial: Body, pieces: Sequence[PieceOfLink
 
 
 def spread_of(link: ModalBody, pieces: Sequence[tuple[float, ModalBody]]) -> Array:
-    """Return the matrix (N, n), no unit, from modes of a link to modes of its pieces, both of the files.
+    """The matrix (N, n), no unit, from modes of a link to modes of its pieces, both of the files.
 
     `pieces`: begin, m from the root, and modal body of each from root to tip. Bending planes, twist and stretch do not
     couple, so that their rigidities do not matter.

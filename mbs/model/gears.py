@@ -19,7 +19,7 @@ from .tree import CompliantGear, KinematicTree
 
 
 def elastic_joints(model: Model) -> list[Node]:
-    """Return the bodies whose inboard joints have compliant gears, in the order of the tree.
+    """The bodies whose inboard joints have compliant gears, in the order of the tree.
 
     Raises `InputError` for such a gear in a joint without a motor.
     """
@@ -32,7 +32,7 @@ def elastic_joints(model: Model) -> list[Node]:
 
 
 def with_compliance(model: Model) -> Model:
-    """Return the robot with the scene's compliant gears; motors and joint moments act on the motor side.
+    """The robot with the scene's compliant gears; motors and joint moments act on the motor side.
 
     The output of such a gear is a massless body of the tree. It turns on the first side of the joint by θ_m, the rotor
     N times as fast (M. W. Spong, J. Dyn. Syst. Meas. Control 109, 1987, with the rotor's whole angular velocity).
@@ -64,7 +64,7 @@ def with_compliance(model: Model) -> Model:
 
 
 def with_prescribed_motors(model: Model) -> Model:
-    """Return the robot with its compliant gears where trajectories prescribe motors; otherwise unchanged.
+    """The robot with its compliant gears where trajectories prescribe motors; otherwise unchanged.
 
     Raises `InputError` if other trajectories prescribe something else: no motor could do both.
     """
@@ -105,7 +105,7 @@ def _rows_at_motors(model: Model, tree: KinematicTree) -> Iterator[ConstraintRow
 
 
 def compliance(node: Node) -> tuple[TwistSpring, float] | None:
-    """Return spring and damping (N·m·s/rad, N·s/m) of the gear in a body's inboard joint; None if it is rigid."""
+    """Spring and damping (N·m·s/rad, N·s/m) of the gear in a body's inboard joint; None if it is rigid."""
     joint = node.joint
     if not isinstance(joint, GearedJoint) or joint.stiffness is None:
         return None
@@ -113,7 +113,7 @@ def compliance(node: Node) -> tuple[TwistSpring, float] | None:
 
 
 def gear_matrices(tree: KinematicTree, q: Array) -> tuple[Array, Array]:
-    """Return K (N·m/rad, N/m) and D (N·m·s/rad, N·s/m), (n_v, n_v), of compliant gears at q (n_q,), SI."""
+    """K (N·m/rad, N/m) and D (N·m·s/rad, N·s/m), (n_v, n_v), of compliant gears at q (n_q,), SI."""
     K, D = np.zeros((2, tree.n_v, tree.n_v))
     for gear in tree.gears:
         twist = np.zeros(tree.n_v)
@@ -124,7 +124,7 @@ def gear_matrices(tree: KinematicTree, q: Array) -> tuple[Array, Array]:
 
 
 def resistance(model: Model, q: Array, v: Array) -> Array:
-    """Return negative forces (T, n_v) of friction in all joints, cut ones too, at q (T, n_q) and v (T, n_v), all SI."""
+    """Negative forces (T, n_v) of friction in all joints, cut ones too, at q (T, n_q) and v (T, n_v), all SI."""
     force = model.along_cut.resistance(q, v)
     for column, friction in _frictions(model.tree):
         force[:, column] += friction.resistance(v[:, column])
@@ -132,7 +132,7 @@ def resistance(model: Model, q: Array, v: Array) -> Array:
 
 
 def friction_damping(model: Model, q: Array, *, is_at_rest: bool = False) -> Array:
-    """Return the damping matrix (n_v, n_v), N·m·s/rad or N·s/m, at q (n_q,), SI: viscous, at rest also dry friction."""
+    """The damping matrix (n_v, n_v), N·m·s/rad or N·s/m, at q (n_q,), SI: viscous, at rest also dry friction."""
     D = model.along_cut.damping(q, is_at_rest=is_at_rest)
     for column, friction in _frictions(model.tree):
         D[column, column] += friction.damping(is_at_rest=is_at_rest)

@@ -56,7 +56,7 @@ class Markers:
         self._sides = [(self.place(node.inner), self.place(node.outer)) for node in nodes]
 
     def place(self, section: Section) -> Placed:
-        """Return index of the body (−1: ground) and, on it, of the marker of a section, which is made if new."""
+        """Index of the body (−1: ground) and, on it, of the marker of a section, which is made if new."""
         known = self._ground if section.body < 0 else self.of_bodies[section.body]
         for number, other in enumerate(known):
             same = other.point == section.point and other.still == section.still
@@ -66,7 +66,7 @@ class Markers:
         return section.body, len(known) - 1
 
     def row(self, row: ConstraintRow) -> _core.ConstraintModel:
-        """Return the core's record of a constraint equation between markers."""
+        """The core's record of a constraint equation between markers."""
         row_model = _core.ConstraintModel()
         row_model.name, row_model.kind = row.owner, getattr(_core.ConstraintKind, row.kind)
         if row.kind == "coordinate":
@@ -85,7 +85,7 @@ class Markers:
         return row_model
 
     def bodies(self, driven: Booleans | None = None) -> list[_core.SpatialBody]:
-        """Return the core's bodies with all markers; `driven` (n_v,): coordinates along which given forces act."""
+        """The core's bodies with all markers; `driven` (n_v,): coordinates along which given forces act."""
         bodies = []
         for node, (inner, outer), markers in zip(self._nodes, self._sides, self.of_bodies, strict=True):
             body = _core.SpatialBody()
@@ -104,7 +104,7 @@ class Markers:
         return bodies
 
     def standing(self) -> list[_core.SpatialMarker]:
-        """Return the markers on the ground."""
+        """The markers on the ground."""
         turning = [number for number, _ in self.turning]
         markers = [_marker(section, np.zeros((6, 0)), section.position, []) for section in self._ground]
         for number, marker in enumerate(markers):
@@ -112,7 +112,7 @@ class Markers:
         return markers
 
     def followed(self, rows: Sequence[ConstraintRow]) -> _core.TreeScene:
-        """Return the functions that `rows` and markers of the ground follow."""
+        """The functions that `rows` and markers of the ground follow."""
         scene = _core.TreeScene()
         for row in rows:
             scene.add_target(ZERO if row.target is None else row.target, row.sign)
@@ -128,7 +128,7 @@ def moves(node: Node) -> bool:
 
 
 def rows_of(body: Body, section: Section) -> tuple[Array, Array, list[Array]]:
-    """Return translations Φ over rotations Φ_r (6, n), 1/√kg, 1/(√kg·m), and the position (3,), m, of a section.
+    """Translations Φ over rotations Φ_r (6, n), 1/√kg, 1/(√kg·m), and the position (3,), m, of a section.
 
     Third are its six `Stiffening.K_points` (n, n), 1/(kg·m) and 1/(kg·m²), or none.
     """
@@ -212,19 +212,19 @@ class Kinematics:
         return cls(nodes, [*points, *still])
 
     def places(self, q: Array, v: Array | None = None) -> "Places":
-        """Return positions (m) and motions (m/s, rad/s) at q (T, n_q) and v (T, n_v), SI, by default at rest."""
+        """Positions (m) and motions (m/s, rad/s) at q (T, n_q) and v (T, n_v), SI, by default at rest."""
         rates = np.zeros((len(q), self.core.n_v)) if v is None else v
         return Places(
             self._numbers, self.core.motions(q, rates).reshape(len(q), len(self.nodes) + len(self._numbers), MOTION)
         )
 
     def values(self, q: Array, times: Array) -> tuple[Array, Array]:
-        """Return equations C (T, rows), m or rad, and C_v (T, rows, n_v), at q (T, n_q), SI, and `times` (T,), s."""
+        """Equations C (T, rows), m or rad, and C_v (T, rows, n_v), at q (T, n_q), SI, and `times` (T,), s."""
         values, gradients = self.core.constraints(self.scene, times.tolist(), q)
         return self.signs * values, self.signs[:, None] * gradients.reshape(len(q), len(self.signs), self.core.n_v)
 
     def rates(self, q: Array, v: Array, times: Array) -> Array:
-        """Return rates Ċ (T, rows), m/s or rad/s, of the equations at q (T, n_q), v (T, n_v), SI, `times` (T,), s."""
+        """Rates Ċ (T, rows), m/s or rad/s, of the equations at q (T, n_q), v (T, n_v), SI, `times` (T,), s."""
         return self.signs * self.core.constraint_rates(self.scene, times.tolist(), q, v)
 
 
@@ -236,7 +236,7 @@ class Places:
         self._numbers, self._motions = numbers, motions
 
     def frame(self, number: int) -> Motion:
-        """Return the motion of the frame of body no. `number`."""
+        """The motion of the frame of body no. `number`."""
         return self._motion(self._numbers.get((number, "", None), number))
 
     def _motion(self, number: int) -> Motion:
@@ -244,7 +244,7 @@ class Places:
         return Motion(columns[:, :3], columns[:, 3:12].reshape(-1, 3, 3), columns[:, 12:15], columns[:, 15:])
 
     def at(self, section: Section) -> Motion:
-        """Return the motion of the triad of a section."""
+        """The motion of the triad of a section."""
         if section.body < 0:
             zero = np.zeros((len(self._motions), 3))
             return Motion(section.position + zero, np.tile(section.triad, (len(zero), 1, 1)), zero, zero)

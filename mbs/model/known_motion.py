@@ -19,11 +19,11 @@ class Wrench(NamedTuple):
     moment: Array
 
     def seen_from(self, arm: Array) -> "Wrench":
-        """Return the wrench about another point, from which the present one is at `arm` (T, 3), m, global axes."""
+        """The wrench about another point, from which the present one is at `arm` (T, 3), m, global axes."""
         return Wrench(self.force, self.moment + np.cross(arm, self.force))
 
     def plus(self, other: "Wrench") -> "Wrench":
-        """Return the sum of two wrenches about one point."""
+        """The sum of two wrenches about one point."""
         return Wrench(self.force + other.force, self.moment + other.moment)
 
 
@@ -78,18 +78,18 @@ class MotionForces:
     found: _core.MotionForces
 
     def of_joint(self, number: int) -> Wrench:
-        """Return the wrench of the joint of body no. `number` on its outer side, including a rotor there."""
+        """The wrench of the joint of body no. `number` on its outer side, including a rotor there."""
         node, on_section = self.system.model.tree.nodes[number], _wrench(self.found.joints, number)
         if not node.backwards:
             return on_section
         return Wrench(on_section.force, on_section.moment + self.of_rotor(number))
 
     def of_rotor(self, number: int) -> Array:
-        """Return the rate (T, 3), N·m, of the angular momentum of the rotor in the joint that carries body `number`."""
+        """The rate (T, 3), N·m, of the angular momentum of the rotor in the joint that carries body `number`."""
         return self.found.rotors[:, 3 * number : 3 * number + 3]
 
     def carried(self, q: Array) -> list[Wrench]:
-        """Return reactions, N and N·m, of joints about their outer sides, (T, 3), at q (T, n_q), SI.
+        """Reactions, N and N·m, of joints about their outer sides, (T, 3), at q (T, n_q), SI.
 
         Forces that do work are left out: of motors, loads and friction along joint coordinates.
         """
@@ -99,7 +99,7 @@ class MotionForces:
         return [_wrench(table, number) for number in numbers]
 
     def of_row(self, number: int) -> Wrench:
-        """Return the wrench of constraint equation `number` on its section b; 0 for joint coordinates."""
+        """The wrench of constraint equation `number` on its section b; 0 for joint coordinates."""
         return _wrench(self.found.constraints, 2 * number + 1)
 
     @cached_property
@@ -111,11 +111,11 @@ class MotionForces:
         return wrenches
 
     def of_body(self, number: int) -> SectionMotion:
-        """Return the accelerations of the frame of body no. `number`."""
+        """The accelerations of the frame of body no. `number`."""
         return _motion(self.found.bodies, number)
 
     def of_point(self, point: str) -> SectionMotion:
-        """Return the accelerations of the section "BODY.POINT", on which a drive of the system must act."""
+        """The accelerations of the section "BODY.POINT", on which a drive of the system must act."""
         return _motion(self.found.points, self.system.point_number(point))
 
 
@@ -128,20 +128,20 @@ def _motion(table: Array, number: int) -> SectionMotion:
 
 
 def motion_forces(system: MultibodySystem, states: States, times: Array, multipliers: Array) -> MotionForces:
-    """Return forces of a motion under multipliers (T, rows), N or N·m, and all given forces at `times` (T,), s."""
+    """Forces of a motion under multipliers (T, rows), N or N·m, and all given forces at `times` (T,), s."""
     of_core = multipliers * system.model.row_signs
     forces = system.core.motion_forces(system.scene, times.tolist(), states.q, states.v, states.a, of_core)
     return MotionForces(system, forces)
 
 
 def multiplier_forces(system: MultibodySystem, q: Array, times: Array, multipliers: Array) -> MotionForces:
-    """Return forces in joints and constraints by multipliers (T, rows), N or N·m, alone, at `times` (T,), s."""
+    """Forces in joints and constraints by multipliers (T, rows), N or N·m, alone, at `times` (T,), s."""
     forces = system.core.multiplier_forces(system.scene, times.tolist(), q, multipliers * system.model.row_signs)
     return MotionForces(system, forces)
 
 
 def rotor_torques(system: MultibodySystem, states: States, times: Array) -> Array:
-    """Return J u̇ (T, bodies), N·m, of the rotor in each body's inboard joint, u its speed, else 0; `times` (T,), s."""
+    """J u̇ (T, bodies), N·m, of the rotor in each body's inboard joint, u its speed, else 0; `times` (T,), s."""
     tree = system.model.tree
     forces = motion_forces(system, states, times, np.zeros((len(times), len(system.model.rows))))
     places, torque = tree.places(states.q), np.zeros((len(times), len(tree.nodes)))
@@ -156,18 +156,18 @@ def rotor_torques(system: MultibodySystem, states: States, times: Array) -> Arra
 
 
 def required_forces(system: MultibodySystem, state: States, times: Array) -> Array:
-    """Return M v̇ − Q (T, n_v), N, N·m, N/√kg, at `times` (T,), s; Q: gravity, elasticity, friction, given loads."""
+    """M v̇ − Q (T, n_v), N, N·m, N/√kg, at `times` (T,), s; Q: gravity, elasticity, friction, given loads."""
     return system.core.required_forces(system.scene, times.tolist(), state.q, state.v, state.a)
 
 
 def row_accelerations(system: MultibodySystem, state: States, times: Array) -> Array:
-    """Return C̈ (T, rows), m/s² or rad/s², of constraints against their targets at `times` (T,), s."""
+    """C̈ (T, rows), m/s² or rad/s², of constraints against their targets at `times` (T,), s."""
     of_core = system.core.row_accelerations(system.scene, times.tolist(), state.q, state.v, state.a)
     return of_core * system.model.row_signs
 
 
 def mass_matrices(system: MultibodySystem, q: Array, t: float = 0.0) -> Array:
-    """Return mass matrices (T, n_v, n_v), SI, at q (T, n_q), SI, by forces of unit accelerations."""
+    """Mass matrices (T, n_v, n_v), SI, at q (T, n_q), SI, by forces of unit accelerations."""
     T, n = len(q), system.model.tree.n_v
     a = np.tile(np.vstack([np.zeros(n), np.eye(n)]), (T, 1))
     states = np.repeat(q, n + 1, axis=0), np.zeros((T * (n + 1), n)), a

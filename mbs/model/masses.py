@@ -81,7 +81,7 @@ def _uncoupled(body: Body, m_ff: Array, added: Array | float = 0.0) -> Body:
 
 
 def uncoupling(M: Array, K: Array) -> tuple[Array, Array]:
-    """Return T (n, n), no unit, with TᵀMT = 1, TᵀKT = diag(stiffness), and this stiffness (n,), rad²/s², of n modes.
+    """T (n, n), no unit, with TᵀMT = 1, TᵀKT = diag(stiffness), and this stiffness (n,), rad²/s², of n modes.
 
     Modes that M (n, n), no unit, and K (n, n), rad²/s², do not couple are not mixed, even at equal frequencies, so
     that they keep their families. Coupled ones are in ascending order in the places that they had.
@@ -96,7 +96,7 @@ def uncoupling(M: Array, K: Array) -> tuple[Array, Array]:
 
 
 def coupled_blocks(*matrices: Array) -> list[Indices]:
-    """Return sets of indices (any,) of modes that any of the `matrices` (n, n), of any unit, couples."""
+    """Sets of indices (any,) of modes that any of the `matrices` (n, n), of any unit, couples."""
     coupled = np.eye(len(matrices[0]), dtype=bool)
     for matrix in matrices:
         scale = np.sqrt(np.diag(matrix))

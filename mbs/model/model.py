@@ -43,7 +43,7 @@ class Constraints(Kinematics):
         return [row.owner for row in turning], Kinematics(self.nodes, rows=turning)
 
     def natural_gradients(self, q: Array, times: Array, sizes: Array | None = None) -> Array:
-        """Return C_v (T, rows, n_v), no unit, at q (T, n_q), SI, and `times` (T,), s, to find its rank.
+        """C_v (T, rows, n_v), no unit, at q (T, n_q), SI, and `times` (T,), s, to find its rank.
 
         Equations are relative to natural sizes, coordinates to `sizes` (n_v,), by default those of joints.
         """
@@ -52,7 +52,7 @@ class Constraints(Kinematics):
         return np.where(np.abs(C_v) > NO_SLOPE, C_v, 0.0)
 
     def turned_over(self, q: Array, times: Array) -> dict[str, Booleans]:
-        """Return by name (T,) whether a loop joint or tool axis is turned by π at q (T, n_q), SI, and `times` (T,), s.
+        """By name (T,) whether a loop joint or tool axis is turned by π at q (T, n_q), SI, and `times` (T,), s.
 
         "dot" equations, which do not distinguish senses of parallel axes, are 0 there, too.
         """
@@ -140,7 +140,7 @@ class Model:
         return np.array([column for columns in self.motors.values() for column in columns], dtype=np.intp)
 
     def by_motor(self, values: Array) -> dict[str, Array]:
-        """Return columns (…, k) of `values` (…, motors and any others), of any unit, by joint with motors."""
+        """Columns (…, k) of `values` (…, motors and any others), of any unit, by joint with motors."""
         motors = self.motors
         parts = np.split(values, np.cumsum([len(columns) for columns in motors.values()]), axis=-1)
         return dict(zip(motors, parts[:-1], strict=True))
@@ -150,7 +150,7 @@ class Model:
         return _in_order(self.tree.nodes[self.tree.carried[joint]])
 
     def joint_of(self, row: ConstraintRow) -> str:
-        """Return the scene's joint whose coordinate, or whose motor's, a constraint equation prescribes."""
+        """The scene's joint whose coordinate, or whose motor's, a constraint equation prescribes."""
         behind = {gear.motor.v.start: gear.joint.joint.name for gear in self.tree.gears}
         return behind.get(row.coordinate, self.tree.nodes[row.b.body].joint.name)
 
@@ -169,16 +169,16 @@ class Model:
         return self.driven(joint).sign
 
     def driven(self, joint: str) -> Node:
-        """Return the node that torques on a joint turn: its body, or its motor behind a compliant gear."""
+        """The node that torques on a joint turn: its body, or its motor behind a compliant gear."""
         behind = {gear.joint.joint.name: gear.motor for gear in self.tree.gears}
         return behind.get(joint, self.tree.nodes[self.tree.carried[joint]])
 
     def without_paths(self) -> "Model":
-        """Return the robot without trajectories, with constraint equations of loops alone."""
+        """The robot without trajectories, with constraint equations of loops alone."""
         return replace(self, rows=tuple(row for row in self.rows if not row.is_trajectory))
 
     def modal_directions(self, on_modes: Mapping[str, Array]) -> Array:
-        """Return generalized forces (k, n_v), N/√kg, of k forces (n, k), N/√kg, on the modes of files by body."""
+        """Generalized forces (k, n_v), N/√kg, of k forces (n, k), N/√kg, on the modes of files by body."""
         (count,) = {forces.shape[1] for forces in on_modes.values()}
         directions = np.zeros((count, self.tree.n_v))
         for node in self.tree.nodes:
@@ -187,7 +187,7 @@ class Model:
         return directions
 
     def compliance(self, forces: Array, others: Array) -> Array:
-        """Return static deflections (k, m) of modes by generalized `forces` (k, n_v) along `others` (m, n_v), SI."""
+        """Static deflections (k, m) of modes by generalized `forces` (k, n_v) along `others` (m, n_v), SI."""
         return np.sum([forces[:, of.p_v] / of.body.stiffness @ others[:, of.p_v].T for of in self.tree.nodes], axis=0)
 
     @cached_property
@@ -225,7 +225,7 @@ class Model:
         return sizes
 
     def path_errors(self, times: Array, q: Array) -> dict[str, Array]:
-        """Return path errors (T, m), m or rad, by trajectory, at `times` (T,), s, and q (T, n_q), SI."""
+        """Path errors (T, m), m or rad, by trajectory, at `times` (T,), s, and q (T, n_q), SI."""
         C, owners = self.constraints.values(q, times)[0], [row.owner if row.is_trajectory else "" for row in self.rows]
         return {path.name: C[:, [owner == path.name for owner in owners]] for path in self.scene.trajectory}
 

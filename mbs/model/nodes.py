@@ -27,7 +27,7 @@ class Section(NamedTuple):
     still: bool = False
 
     def turned(self, rotation: Array) -> Array:
-        """Return the triad's `rotation` (…, 3, n), any unit, from the section's: without that about z if `still`."""
+        """The triad's `rotation` (…, 3, n), any unit, from the section's: without that about z if `still`."""
         if not self.still:
             return rotation
         z = self.triad[:, 2]
@@ -56,13 +56,13 @@ class Node:
         return -1.0 if self.backwards else 1.0
 
     def coordinates(self, q: Array) -> Array:
-        """Return the joint's coordinates (…, k), rad or m, in the scene's order, at q (…, n_q), rad and m."""
+        """The joint's coordinates (…, k), rad or m, in the scene's order, at q (…, n_q), rad and m."""
         own = self.joint.coordinates(q[..., self.q])
         return self.joint.turned_around(own) if self.backwards else own
 
 
 def rotor(node: Node) -> tuple[float, float]:
-    """Return the inertia J (kg·m²) of the rotor in the inboard joint of a body, 0 without one, and its gear ratio N."""
+    """The inertia J (kg·m²) of the rotor in the inboard joint of a body, 0 without one, and its gear ratio N."""
     return float(getattr(node.joint, "rotor_inertia", 0.0)), float(getattr(node.joint, "gear_ratio", 1.0))
 
 
@@ -95,7 +95,7 @@ class ConstraintRow:
 def rows_of_joint(
     owner: str, node: Node, columns: Array, targets: Sequence[TimeFunction | None], sign: float = 1.0
 ) -> list[ConstraintRow]:
-    """Return equations by which a node's joint coordinates at `columns` (k,) of v, times `sign`, follow k `targets`.
+    """Equations by which a node's joint coordinates at `columns` (k,) of v, times `sign`, follow k `targets`.
 
     For planar joints, whose axes turn, they are between sections, with `sign` 1.
     """

@@ -27,7 +27,7 @@ PLANE, TURN = np.diag(ALONG), np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0,
 
 
 def projected(body: Body) -> Body:
-    """Return a body without motion across the plane z = 0 of its frame, and without modes that move only so."""
+    """A body without motion across the plane z = 0 of its frame, and without modes that move only so."""
     moving = np.flatnonzero(np.einsum("kknn->n", body.S_bar_kl[:2, :2]) > IMMOBILE)
     kept = transformed(body, np.eye(body.n_modes)[:, moving], body.stiffness[moving])
     center = kept.first_moment * ALONG / kept.mass
@@ -62,7 +62,7 @@ def projected(body: Body) -> Body:
 
 
 def vanishing_in_plane(body: Body) -> tuple[str, ...]:
-    """Return names of terms (D_ff, j, S_tilde) that are round-off in planar equations of a body; none if rigid."""
+    """Names of terms (D_ff, j, S_tilde) that are round-off in planar equations of a body; none if rigid."""
     if not body.n_modes:
         return ()
     size = np.sqrt(body.mass) * max((float(np.linalg.norm(at.position)) for at in body.points.values()), default=0.0)
@@ -95,7 +95,7 @@ class AcrossError(Exception):
 
 
 def axes_across(normal: Array) -> Array:
-    """Return unit axes (3, 3), rows x, y and the unit `normal` (3,); x is kept if the normal is across it."""
+    """Unit axes (3, 3), rows x, y and the unit `normal` (3,); x is kept if the normal is across it."""
     x = np.eye(3)[0 if abs(normal[0]) < 0.9 else 1]
     x = x - normal * (normal @ x)
     x /= np.linalg.norm(x)
@@ -103,7 +103,7 @@ def axes_across(normal: Array) -> Array:
 
 
 def axes_of_triad(normal: Array) -> Array:
-    """Return axes (3, 3) of a planar marker, rows x, y and the unit `normal` (3,), in axes of its triad in space.
+    """Axes (3, 3) of a planar marker, rows x, y and the unit `normal` (3,), in axes of its triad in space.
 
     Triads of revolute and planar joints have z along the normal; z of prismatic ones, along which they slide, is x.
     """
@@ -119,7 +119,7 @@ def _is_small(across: Array, whole: Array) -> bool:
 
 
 def planar_marker(marker: _core.SpatialMarker, axes: Array) -> _core.PlanarMarker:
-    """Return the marker in 2D; unit `axes` (3, 3): rows x, y of the plane and its normal, body axes.
+    """The marker in 2D; unit `axes` (3, 3): rows x, y of the plane and its normal, body axes.
 
     Raises `AcrossError` if modes move it out of the plane.
     """
@@ -138,7 +138,7 @@ def planar_marker(marker: _core.SpatialMarker, axes: Array) -> _core.PlanarMarke
 
 
 def planar_data(data: _core.SpatialData, axes: Array) -> _core.PlanarData:
-    """Return constants of a body in the plane of the first two unit `axes` (3, 3), rows.
+    """Constants of a body in the plane of the first two unit `axes` (3, 3), rows.
 
     Raises `AcrossError` if it bends out of the plane or twists.
     """
@@ -209,14 +209,14 @@ class Plane(NamedTuple):
     cut: tuple[CutPlace, ...]
 
     def shares(self, component: int) -> list[tuple[int, float]]:
-        """Return planar components (0, 1: force, 2: moment), with shares, of a global force (0–2) or moment (3–5)."""
+        """Planar components (0, 1: force, 2: moment), with shares, of a global force (0–2) or moment (3–5)."""
         along = self.axes[:, component % 3]
         parts = [(2, along[2])] if component >= 3 else [(0, along[0]), (1, along[1])]
         return [(k, float(share)) for k, share in parts if abs(share) > EXACT]
 
 
 def in_plane(parts: ModelParts, is_path: Booleans) -> Plane | None:
-    """Return the mechanism in its plane; None without one. `is_path` (rows,): equations that must be kept."""
+    """The mechanism in its plane; None without one. `is_path` (rows,): equations that must be kept."""
     if any(marker.turns for marker in parts.ground) or not all(body.joint.is_planar for body in parts.bodies):
         return None
     frames = _frames(parts)

@@ -115,7 +115,7 @@ class MultibodySystem:
         return _core.Replay(self.replayed.source, zero_order_hold(self.model, self.replayed.commands), at_points)
 
     def multipliers(self, of_core: Array) -> Array:
-        """Return multipliers (T, rows), N, N·m, of the model from those of `integrated`; 0 if omitted or dependent."""
+        """Multipliers (T, rows), N, N·m, of the model from those of `integrated`; 0 if omitted or dependent."""
         of_rows = of_core if self.plane is None else of_core @ self.plane.spread.T
         return of_rows * self.model.row_signs
 
@@ -125,7 +125,7 @@ class MultibodySystem:
         return [self._markers.of_bodies[body][marker] for body, marker in self.core.sections]
 
     def point_number(self, point: str) -> int:
-        """Return the index among the core's wrenches of "BODY.POINT", on which a load or drive acts."""
+        """The index among the core's wrenches of "BODY.POINT", on which a load or drive acts."""
         return self._wrenches.index(self._markers.place(self.model.tree.section(point)))
 
     def forward_model(self) -> _core.ForwardModel:
@@ -197,7 +197,7 @@ def _shares(component: int, plane: Plane | None) -> list[tuple[int, float]]:
 
 
 def zero_order_hold(model: Model, commands: Sequence[Command]) -> _core.ZeroOrderHold:
-    """Return the core's forces of `commands`, in this order, which are constant between samples."""
+    """The core's forces of `commands`, in this order, which are constant between samples."""
     hold = _core.ZeroOrderHold(np.reshape([c.direction for c in commands], (len(commands), model.tree.n_v)).T)
     for number, command in enumerate(commands):
         if command.frame is None:
@@ -219,7 +219,7 @@ class MotorForces:
 
 
 def driven_system(model: Model) -> MultibodySystem:
-    """Return the model in the core, with forces along the coordinates of its motors."""
+    """The model in the core, with forces along the coordinates of its motors."""
     return MultibodySystem(model, commands=[Command(along) for joint in model.motors for along in model.along(joint)])
 
 
@@ -233,7 +233,7 @@ def driven_mechanism(model: Model, *, has_motors: bool = True) -> _core.SpatialD
 
 
 def fastest_mechanism(model: Model, *, has_motors: bool = True) -> _core.PlanarDriven | _core.SpatialDriven:
-    """Return the core's mechanism, planar for open chains that move in a plane, where both have the same equations."""
+    """The core's mechanism, planar for open chains that move in a plane, where both have the same equations."""
     system = driven_system(model)
     if model.loop_rows.any() or system.plane is None:
         return driven_mechanism(model, has_motors=has_motors)
@@ -243,7 +243,7 @@ def fastest_mechanism(model: Model, *, has_motors: bool = True) -> _core.PlanarD
 def integrated_mechanism(
     system: MultibodySystem, *, has_motors: bool = True
 ) -> _core.PlanarDriven | _core.SpatialDriven:
-    """Return the mechanism for integrators: planar if all motion is in one plane."""
+    """The mechanism for integrators: planar if all motion is in one plane."""
     (core, scene, rows), model = system.integrated, system.model
     is_path = [model.rows[k].is_trajectory for k in rows]
     driven: _core.PlanarDriven | _core.SpatialDriven
@@ -264,12 +264,12 @@ def _add_motors(driven: _core.PlanarDriven | _core.SpatialDriven, model: Model) 
 
 
 def path_forces(model: Model, times: Array, q: Array, multipliers: Array) -> Array:
-    """Return generalized forces −C_sᵀλ_s (T, n_v) of paths by multipliers (T, rows), N or N·m, at q (T, n_q); SI."""
+    """Generalized forces −C_sᵀλ_s (T, n_v) of paths by multipliers (T, rows), N or N·m, at q (T, n_q); SI."""
     return driven_mechanism(model).path_forces(times.tolist(), q, multipliers * model.row_signs)
 
 
 def frames_in_core(model: Model, q: Array) -> list[tuple[Array, Array]]:
-    """Return axes (3, 3) and origin (3,), m, of each body's frame in the core's frame of this body, at q (n_q,), SI."""
+    """Axes (3, 3) and origin (3,), m, of each body's frame in the core's frame of this body, at q (n_q,), SI."""
     places, frames = model.tree.places(q[None]), driven_system(model).core.frames(q, np.zeros(model.tree.n_v))
     own = [places.frame(number) for number in range(len(frames))]
     return [(of.R.T @ at.F[0], of.R.T @ (at.r[0] - of.r)) for of, at in zip(frames, own, strict=True)]
@@ -302,7 +302,7 @@ def split_forces(model: Model, q: Array, wanted: Array) -> SplitForces:
 
 
 def motor_forces(model: Model, q: Array, wanted: Array) -> MotorForces:
-    """Return motor torques and modal forces that make `wanted` (T, n_v), N, N·m, N/√kg, at q (T, n_q), SI."""
+    """Motor torques and modal forces that make `wanted` (T, n_v), N, N·m, N/√kg, at q (T, n_q), SI."""
     moments, left, _ = split_forces(model, q, wanted)
     stored = {node.body.name: left[:, node.p_v] @ node.body.on_file for node in model.tree.nodes}
     return MotorForces(moments, stored)
@@ -319,7 +319,7 @@ class FrameShare(NamedTuple):
 
 
 def frame_share(model: Model, joint: str, q: Array) -> FrameShare:
-    """Return modal forces per torque of a revolute motor on the outer body at q (n_q,), SI: theory.md, Eq. 30."""
+    """Modal forces per torque of a revolute motor on the outer body at q (n_q,), SI: theory.md, Eq. 30."""
     tree = model.tree
     direction, slope = np.zeros(tree.n_v), np.zeros((tree.n_v, tree.n_v))
     node = tree.nodes[tree.carried[joint]]
@@ -334,7 +334,7 @@ def frame_share(model: Model, joint: str, q: Array) -> FrameShare:
 
 
 def turning_motors(model: Model) -> list[str]:
-    """Return names of joints whose one angle is between sections, but whose motors turn the frames of bodies."""
+    """Names of joints whose one angle is between sections, but whose motors turn the frames of bodies."""
     if model.scene.motors != "frame":
         return []
     tree = model.tree

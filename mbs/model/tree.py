@@ -44,12 +44,12 @@ class CompliantGear(NamedTuple):
     damping: float
 
     def twist(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """Return the twist δ (…,), rad or m, and its rate δ̇, rad/s or m/s, at q (…, n_q), v (…, n_v), SI."""
+        """The twist δ (…,), rad or m, and its rate δ̇, rad/s or m/s, at q (…, n_q), v (…, n_v), SI."""
         a, b = self.motor, self.joint
         return q[..., a.q.start] - self.sign * q[..., b.q.start], v[..., a.v.start] - self.sign * v[..., b.v.start]
 
     def round_off(self, q: Array) -> float:
-        """Return the round-off of the spring's torque, relative to the largest at q (T, n_q), rad and m.
+        """The round-off of the spring's torque, relative to the largest at q (T, n_q), rad and m.
 
         0 where all torque is round-off.
         """
@@ -109,7 +109,7 @@ class KinematicTree:
         self.carried = {node.joint.name: number for number, node in enumerate(nodes)}
 
     def section(self, side: str, triad: Array = AXES, at: Sequence[float] = (0.0, 0.0, 0.0)) -> Section:
-        """Return section "BODY.POINT", frame of "BODY", or "ground" `at` (3,), m; `triad` (3, 3): columns of axes."""
+        """Section "BODY.POINT", frame of "BODY", or "ground" `at` (3,), m; `triad` (3, 3): columns of axes."""
         if side == GROUND:
             return Section(-1, "", triad, np.array(at, dtype=float))
         body, _, point = side.partition(".")
@@ -117,12 +117,12 @@ class KinematicTree:
         return Section(self.index[body], point, own, np.zeros(3))
 
     def sides(self, joint: JointRecord) -> tuple[Section, Section]:
-        """Return the sections of the first and the second side of a joint."""
+        """The sections of the first and the second side of a joint."""
         first, second = zip(joint.between, joint.triads(), strict=True)
         return self.section(*first, joint.at), self.section(*second, joint.at)
 
     def with_outputs(self, outputs: Sequence[tuple[JointRecord, str, Section]]) -> "KinematicTree":
-        """Return the tree with the output of a rotor's gear for each (joint, output's name, section).
+        """The tree with the output of a rotor's gear for each (joint, output's name, section).
 
         It is a massless body that moves on this section as the joint does. Outputs come after all bodies.
         """
@@ -138,7 +138,7 @@ class KinematicTree:
         return tree
 
     def with_bodies(self, bodies: Sequence[Body]) -> "KinematicTree":
-        """Return the tree with other bodies of the same names, modes and points, in its order."""
+        """The tree with other bodies of the same names, modes and points, in its order."""
         tree = copy.copy(self)
         tree.nodes = tuple(replace(node, body=body) for node, body in zip(self.nodes, bodies, strict=True))
         return tree
@@ -166,7 +166,7 @@ class KinematicTree:
         return q
 
     def places(self, q: Array, v: Array | None = None) -> Places:
-        """Return positions, m, velocities, m/s, rad/s, of frames and sections at q (T, n_q), v (T, n_v) or 0, SI."""
+        """Positions, m, velocities, m/s, rad/s, of frames and sections at q (T, n_q), v (T, n_v) or 0, SI."""
         return self._moving.places(q, v)
 
     def integrate(self, q: Array, dv: Array) -> Array:
@@ -204,12 +204,12 @@ class CutCoordinate(NamedTuple):
     guess: float  # of its first value, from [initial], else 0
 
     def resistance(self, rate: Array) -> Array:
-        """Return the negative friction (T,), N·m or N, at the coordinate's rate (T,), rad/s or m/s."""
+        """The negative friction (T,), N·m or N, at the coordinate's rate (T,), rad/s or m/s."""
         return np.zeros_like(rate) if self.friction is None else self.friction.resistance(rate)
 
 
 def with_auxiliary_rotors(tree: KinematicTree) -> tuple[KinematicTree, list[ConstraintRow]]:
-    """Return the tree with rotors' outputs on first sides of cut joints, and equations to follow these joints."""
+    """The tree with rotors' outputs on first sides of cut joints, and equations to follow these joints."""
     cut = [joint for joint in tree.loops if getattr(joint, "rotor_inertia", 0.0)]
     rows = [cut_row(tree, joint) for joint in cut]
     longer = tree.with_outputs([(joint, f"{joint.name}/rotor", row.a) for joint, row in zip(cut, rows, strict=True)])
@@ -229,7 +229,7 @@ def cut_coordinates(scene: MechanismScene, tree: KinematicTree) -> Iterator[CutC
 
 
 def cut_row(tree: KinematicTree, joint: JointRecord, number: int = 0) -> ConstraintRow:
-    """Return the equation of coordinate `number` of a cut joint, second side on first, times the equation's `sign`."""
+    """The equation of coordinate `number` of a cut joint, second side on first, times the equation's `sign`."""
     along = joint.along[number]
     sides = tree.sides(joint)
     if joint.name in tree.on_frames:
@@ -281,13 +281,13 @@ class AlongCut:
         self._kinematics = Kinematics(tree.nodes, rows=[one.row for one in cut]) if cut else None
 
     def measured(self, q: Array) -> tuple[Array, Array]:
-        """Return γ (T, cut), rad or m, at q (T, n_q), angles within ±π, and G = ∂γ̇/∂v (T, cut, n_v); SI."""
+        """γ (T, cut), rad or m, at q (T, n_q), angles within ±π, and G = ∂γ̇/∂v (T, cut, n_v); SI."""
         if self._kinematics is None:
             return np.zeros((len(q), 0)), np.zeros((len(q), 0, self._n_v))
         return self._kinematics.values(q, np.zeros(len(q)))
 
     def resistance(self, q: Array, v: Array) -> Array:
-        """Return negative generalized forces (T, n_v), N, N·m, N/√kg, of friction at q (T, n_q), v (T, n_v), SI."""
+        """Negative generalized forces (T, n_v), N, N·m, N/√kg, of friction at q (T, n_q), v (T, n_v), SI."""
         force = np.zeros_like(v)
         gradients = self.measured(q)[1] if self._rough else force
         for k in self._rough:
@@ -296,7 +296,7 @@ class AlongCut:
         return force
 
     def damping(self, q: Array, *, is_at_rest: bool) -> Array:
-        """Return the damping matrix (n_v, n_v) at q (n_q,), SI: viscous friction, at rest also dry friction."""
+        """The damping matrix (n_v, n_v) at q (n_q,), SI: viscous friction, at rest also dry friction."""
         D = np.zeros((self._n_v, self._n_v))
         gradients = self.measured(q[None])[1][0] if self._rough else D
         for k in self._rough:
@@ -306,7 +306,7 @@ class AlongCut:
         return D
 
     def motions(self, q: Array, v: Array, times: Array) -> list[CutMotion]:
-        """Return motions at q (T, n_q), v (T, n_v), SI, and `times` (T,), s; angles start nearest to their guesses."""
+        """Motions at q (T, n_q), v (T, n_v), SI, and `times` (T,), s; angles start nearest to their guesses."""
         motions = list[CutMotion]()
         if self._kinematics is None:
             return motions

@@ -19,7 +19,7 @@ DEPENDENT = 1e-8  # of the first static shape, in energy: smaller ones are depen
 
 
 def with_fewer_modes(body: Body, lowest: int, loaded: Sequence[str]) -> Body:
-    """Return the body with its `lowest` modes and the static response of others to each load at points `loaded`.
+    """The body with its `lowest` modes and the static response of others to each load at points `loaded`.
 
     A unit load bends the discarded modes. These shapes, orthonormal in mass and uncoupled, are further modes: the
     static flexibility at `loaded` stays exact. A body that would save none is unchanged. Attachment modes of
@@ -51,7 +51,7 @@ def with_fewer_modes(body: Body, lowest: int, loaded: Sequence[str]) -> Body:
 
 
 def modes_kept(body: Body) -> str:
-    """Return the number of modes of a body as text; in planar scenes of those that move in the plane."""
+    """The number of modes of a body as text; in planar scenes of those that move in the plane."""
     if body.reduction is None:
         attachment = f" and {body.attachment_modes} attachment modes" if body.attachment_modes else ""
         return f"all {body.n_eigenmodes} modes{attachment}"
@@ -61,13 +61,13 @@ def modes_kept(body: Body) -> str:
 
 
 def loaded_points(scene: MechanismKeys, body: str) -> list[str]:
-    """Return names of points of a body at which joints, trajectories and loads of the scene act."""
+    """Names of points of a body at which joints, trajectories and loads of the scene act."""
     loaded = [reference.body_and_point for reference in scene.references() if reference.loaded]
     return list(dict.fromkeys(part[1] for part in loaded if part is not None and part[0] == body))
 
 
 def interface_loads(body: Body, loaded: Sequence[str]) -> Array:
-    """Return Bᵀ (n, loads), no unit: modal forces by a load along and about each axis at points, scaled to size 1.
+    """Bᵀ (n, loads), no unit: modal forces by a load along and about each axis at points, scaled to size 1.
 
     Loads under which nothing moves are left out: forces on a support, or along a link without axial modes.
     """

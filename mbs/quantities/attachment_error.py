@@ -80,7 +80,7 @@ def _late(body: Body) -> Array:
 
 
 def start_errors(start: Start) -> tuple[float, float]:
-    """Return the share of the links' largest deformation that vibrates from the start on, and its phase error.
+    """The share of the links' largest deformation that vibrates from the start on, and its phase error.
 
     Deformation is the root of strain energy. The phase error, a share of the same, is that of too few modes. Vibrations
     are 0 on smooth paths from equilibrium, 0.1 to 1 where links start undeformed under gravity, or a path with a jump
@@ -103,7 +103,7 @@ def start_errors(start: Start) -> tuple[float, float]:
 
 
 def start_of_motion(run: Run) -> Start:
-    """Return what `start_errors` needs."""
+    """Data of a run for `start_errors`."""
     tree, n_v = run.model.tree, run.model.tree.n_v
     stiffness, late, damping = np.zeros(n_v), np.zeros(n_v), np.zeros((n_v, n_v))
     energy = np.zeros(len(run.time))
@@ -130,7 +130,7 @@ INTERVALS = 16  # of a piece, over each of which curvature is constant but for i
 
 
 def missed_by_pieces(run: Run, pieces: Mapping[str, ModalBody]) -> Array:
-    """Return the position error (T, 3), m, global axes, at the tip of a link in `pieces`, named from the root on."""
+    """The position error (T, 3), m, global axes, at the tip of a link in `pieces`, named from the root on."""
     ends = {piece: [section_motion(run, f"{piece}.{end}") for end in ("root", "tip")] for piece in pieces}
     end = [*ends.values()][-1][1].r
     missed = np.zeros_like(end)
@@ -146,7 +146,7 @@ def missed_by_pieces(run: Run, pieces: Mapping[str, ModalBody]) -> Array:
 
 
 def ends_in_equations(body: Body, p: Array) -> tuple[Array, Array]:
-    """Return axes (T, 3, 3) and place (T, 3), m, of a piece's tip, seen from its root, by its equations.
+    """Axes (T, 3, 3) and place (T, 3), m, of a piece's tip, seen from its root, by its equations.
 
     At p (T, n), √kg·m.
     """
@@ -156,7 +156,7 @@ def ends_in_equations(body: Body, p: Array) -> tuple[Array, Array]:
 
 
 def rod_ends(modal: ModalBody, p: Array) -> tuple[Array, Array]:
-    """Return axes (T, 3, 3) and place (T, 3), m, of the tip, seen from the root, of a rod with the strains of p (T, n).
+    """Axes (T, 3, 3) and place (T, 3), m, of the tip, seen from the root, of a rod with the strains of p (T, n).
 
     p, √kg·m, are coordinates of the modes of the modal body file.
     """

@@ -30,7 +30,7 @@ class LinkLoads(NamedTuple):
 
 
 def loads_on_links(run: Run, bodies: Iterable[str]) -> dict[str, LinkLoads]:
-    """Return loads on `bodies`; {} where motors turn frames.
+    """Loads on `bodies`; {} where motors turn frames.
 
     Motors that are as many as degrees of freedom act in place of forces on paths.
     """
@@ -46,7 +46,7 @@ def loads_on_links(run: Run, bodies: Iterable[str]) -> dict[str, LinkLoads]:
 
 
 def loads_in_equations(run: Run, bodies: Iterable[str]) -> dict[str, LinkLoads]:
-    """Return the loads that the equations apply to `bodies`, trajectory forces included."""
+    """The loads that the equations apply to `bodies`, trajectory forces included."""
     return _link_loads(run, bodies, acting_forces(behind_gears(run)))
 
 

@@ -45,7 +45,7 @@ class BodyMotion(NamedTuple):
 
 
 def continuous(e: Array) -> Array:
-    """Return quaternions e (T, 4) with signs that do not jump, the first e0 ≥ 0."""
+    """Quaternions e (T, 4) with signs that do not jump, the first e0 ≥ 0."""
     flips = np.sum(e[1:] * e[:-1], axis=1) < 0
     return e * np.where(np.cumsum(np.append(False, flips)) % 2, -1.0, 1.0)[:, None]
 
@@ -133,13 +133,13 @@ def system_of(run: Run) -> MultibodySystem:
 
 @kept
 def acting_forces(run: Run) -> MotionForces:
-    """Return the forces between bodies and in joints of a run."""
+    """The forces between bodies and in joints of a run."""
     return motion_forces(system_of(run), run, run.time, run.multipliers)
 
 
 @kept
 def constraint_rows(run: Run) -> tuple[Array, Array]:
-    """Return C (T, m), m or rad, of m constraint equations, and Jacobians C_v (T, m, n_v), SI."""
+    """C (T, m), m or rad, of m constraint equations, and Jacobians C_v (T, m, n_v), SI."""
     return run.model.constraints.values(run.q, run.time)
 
 
@@ -151,7 +151,7 @@ def cut_motions(run: Run) -> list[tuple[CutCoordinate, CutMotion]]:
 
 
 def constraint_violation(run: Run) -> Array:
-    """Return ratios (T, 3) max|C|/(1 + max|q|), max|Ċ|/(1 + max|v|), max|C̈|/(1 + max|a|); at rest, of C alone."""
+    """Ratios (T, 3) max|C|/(1 + max|q|), max|Ċ|/(1 + max|v|), max|C̈|/(1 + max|a|); at rest, of C alone."""
     levels = [(constraint_rows(run)[0], run.q)]
     if not run.is_at_rest:
         C_dot = run.model.constraints.rates(run.q, run.v, run.time)
@@ -215,14 +215,14 @@ def modal_coordinates(run: Run, body: str) -> Array:
 
 
 def modal_rates(run: Run, body: str) -> Array:
-    """Return rates (T, n), √kg·m/s, of the modes that a body, or the whole link, has in the equations."""
+    """Rates (T, n), √kg·m/s, of the modes that a body, or the whole link, has in the equations."""
     if body in run.links:
         return _links(run)[body].modal_velocity @ run.links[body].to_own
     return run.v[:, node_of(run, body).p_v]
 
 
 def plane_angle(run: Run, body: str) -> Array:
-    """Return θ (T,), rad, of the frame of a body in 2D, without jumps at ±π: full turns of its joints count."""
+    """θ (T,), rad, of the frame of a body in 2D, without jumps at ±π: full turns of its joints count."""
     e = body_motion(run, body).orientation
     angle = 2 * np.arctan2(e[:, 3], e[:, 0])
     counted = _turned(run, run.links[body].names[0] if body in run.links else body)
@@ -254,7 +254,7 @@ def _bent(run: Run, section: Section) -> Array | float:
 
 
 def section_motion(run: Run, point: str) -> Motion:
-    """Return the motion of the section "BODY.POINT"; of a link in pieces, that of the piece with this point."""
+    """The motion of the section "BODY.POINT"; of a link in pieces, that of the piece with this point."""
     name, _, label = point.partition(".")
     place = run.links[name].places[label] if name in run.links else point
     return places(run).at(run.model.tree.section(place))
@@ -271,7 +271,7 @@ def deflection(run: Run, point: str) -> Array:
 
 
 def joint_motion(run: Run, name: str) -> tuple[Array, Array] | None:
-    """Return coordinates (T, k), rad or m, without jumps, of a joint, and rates, rad/s or m/s; None if it has none."""
+    """Coordinates (T, k), rad or m, without jumps, of a joint, and rates, rad/s or m/s; None if it has none."""
     if of_cut := [motion for one, motion in cut_motions(run) if one.joint.name == name]:
         return np.array([one.coordinate for one in of_cut]).T, np.array([one.rate for one in of_cut]).T
     number = run.model.tree.carried.get(name)

@@ -22,7 +22,7 @@ from .supply import behind_gears
 
 
 def reactions(run: Run) -> Mapping[str, Wrench]:
-    """Return reactions (T, 3) by joint: force on its second side, N, and moment about that side, N·m, global axes.
+    """Reactions (T, 3) by joint: force on its second side, N, and moment about that side, N·m, global axes.
 
     A joint of the tree carries the rate of momentum of its outboard subtree less other forces there, and less those
     along its coordinates (motors, friction, loads, rotors). One that closes a loop has those of its multipliers.

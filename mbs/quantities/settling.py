@@ -58,7 +58,7 @@ class Rest(NamedTuple):
 
 
 def commanded_rest(commanding: Run, since: float | None = None) -> Rest | None:
-    """Return the final posture of a run on paths, over at `since`, s, or as `_end` finds.
+    """The final posture of a run on paths, over at `since`, s, or as `_end` finds.
 
     None if paths last to its end, the robot can move freely, the run did not complete, or no equilibrium is near its
     last posture.
@@ -143,7 +143,7 @@ def end_points(scene: MechanismScene, points: Mapping[str, Sequence[str]]) -> It
 
 
 def settling(run: Run, rest: Rest, points: Sequence[str], tolerance: float, lowest: float) -> dict[str, Settling]:
-    """Return the residual vibration of `points`, "BODY.POINT", in a run that should end at `rest`.
+    """The residual vibration of `points`, "BODY.POINT", in a run that should end at `rest`.
 
     `tolerance`, m, is for settling times; `lowest`, Hz, the lowest frequency of the robot or loop, or NaN.
     """

@@ -67,7 +67,7 @@ class SectionLoads:
     modal_force: Array  # (T, n) of both on the modes of the modal body file, N/√kg
 
     def shares(self, x: Array) -> Array:
-        """Return weights (s, g), no unit, of places for sections at x (s,), m: linear below one patch, else 0."""
+        """Weights (s, g), no unit, of places for sections at x (s,), m: linear below one patch, else 0."""
         shares = np.zeros((len(x), len(self.x)))
         for k, (start, end) in enumerate(self.edges):
             own, under = np.flatnonzero(self.patch == k), np.flatnonzero((x >= start) & (x <= end))
@@ -93,7 +93,7 @@ class Recovery:
         return np.concatenate([self.modal, self.sizes, *sections], axis=1)
 
     def at(self, rows: Indices) -> "Recovery":
-        """Return the recovery of the outputs with numbers `rows`."""
+        """The recovery of the outputs with numbers `rows`."""
         of = self.sections
         if of is not None:
             of = replace(of, moment=of.moment[rows], force=of.force[rows], modal_force=of.modal_force[rows])
@@ -101,14 +101,14 @@ class Recovery:
 
 
 def mode_displacement(p: Array) -> Recovery:
-    """Return the recovery from modal coordinates p (T, n), √kg·m, of the file alone."""
+    """The recovery from modal coordinates p (T, n), √kg·m, of the file alone."""
     return Recovery(METHODS[0], p, (), np.zeros((len(p), 0)))
 
 
 def mode_acceleration(
     body: ModalBody, T: Array, p: Array, loads: Mapping[str, Array], sections: SectionLoads | None
 ) -> Recovery:
-    """Return the recovery by mode acceleration: modes without their static part, and loads with static stresses.
+    """The recovery by mode acceleration: modes without their static part, and loads with static stresses.
 
     p (outputs, n), √kg·m, are coordinates of the modes of `body`, its modal body file: T (n, m), no unit, times those
     of the equations. `loads`: sizes (outputs,) of unit loads by name, SI. `sections`: loads of layers.
@@ -131,7 +131,7 @@ def mode_acceleration(
 
 
 def body_stress(body: ModalBody, recovery: Recovery) -> BodyStress:
-    """Return stresses over a motion at the points, and on the surface, for which `body` has modal stresses."""
+    """Stresses over a motion at the points, and on the surface, for which `body` has modal stresses."""
     points = {}
     for name, point in body.stress.items():
         stress = recovery.cases @ _cases(body, recovery, point.position[:1], point.stress[None], point.static)[0].T
@@ -143,7 +143,7 @@ def body_stress(body: ModalBody, recovery: Recovery) -> BodyStress:
 
 
 def surface_stress(body: ModalBody, recovery: Recovery) -> Array:
-    """Return stresses (T, p, 6), Pa, body axes, on the surface of a body whose file has surface stresses."""
+    """Stresses (T, p, 6), Pa, body axes, on the surface of a body whose file has surface stresses."""
     return np.einsum("pin,tn->tpi", _surface_cases(body, recovery), recovery.cases, optimize=True)
 
 
@@ -170,7 +170,7 @@ def _cases(body: ModalBody, recovery: Recovery, x: Array, modal: Array, static: 
 
 
 def von_mises(stress: Array) -> Array:
-    """Return von Mises stress (…,), Pa, of stresses (…, 6), Pa: xx, yy, zz, yz, xz, xy."""
+    """Von Mises stress (…,), Pa, of stresses (…, 6), Pa: xx, yy, zz, yz, xz, xy."""
     return np.linalg.norm(stress @ _distortion().T, axis=-1)
 
 

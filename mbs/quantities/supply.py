@@ -34,7 +34,7 @@ def followed_trajectories(run: Run) -> list[Trajectory]:
 
 @kept
 def actuator_forces(run: Run) -> MotorForces | None:
-    """Return required forces of motors, through compliant gears, and on modes.
+    """Required forces of motors, through compliant gears, and on modes.
 
     None if nothing is prescribed, or in the plane if motors are not as many as degrees of freedom.
     """
@@ -49,7 +49,7 @@ def actuator_forces(run: Run) -> MotorForces | None:
 
 
 def motor_moments(run: Run) -> Mapping[str, Array]:
-    """Return motor torques (T, k) by joint, N·m or N, acting or required for what is prescribed."""
+    """Motor torques (T, k) by joint, N·m or N, acting or required for what is prescribed."""
     forces = actuator_forces(run)
     return run.commanded if forces is None else forces.moments
 
@@ -76,7 +76,7 @@ def gear_motions(run: Run) -> Mapping[str, GearMotion]:
 
 @kept
 def behind_gears(run: Run) -> Run:
-    """Return the run with compliant gears in its tree, motors turned by their twists; itself if it has them."""
+    """The run with compliant gears in its tree, motors turned by their twists; itself if it has them."""
     gears = gear_motions(run)
     if not gears:
         return run
@@ -86,7 +86,7 @@ def behind_gears(run: Run) -> Run:
 
 
 def motor_motion(run: Run, joint: str) -> tuple[Array, Array, Array] | None:
-    """Return angle (T,), rad, and rate (T,), rad/s, of the motor at a compliant gear's output, and the gear's torque.
+    """Angle (T,), rad, and rate (T,), rad/s, of the motor at a compliant gear's output, and the gear's torque.
 
     The torque (T,), N·m, acts on the second side of the joint. None for joints without such a gear.
     """
@@ -122,7 +122,7 @@ class Momentum:
 
 
 def totals(run: Run) -> tuple[Energies, Momentum]:
-    """Return energies and momentum of all bodies and rotors."""
+    """Energies and momentum of all bodies and rotors."""
     run = behind_gears(run)
     system = system_of(run)
     sums = system.core.states_totals(system.scene, run.q, run.v)

@@ -63,7 +63,7 @@ class ModalLoads:
 
 
 def lasting(loads: ModalLoads, time: Array) -> ModalLoads:
-    """Return means of the loads at `time` (T,), s, over the link's lowest period: it cannot follow shorter loads.
+    """Means of the loads at `time` (T,), s, over the link's lowest period: it cannot follow shorter loads.
 
     Loads below those that buckle the link are returned as they are.
     """
@@ -79,7 +79,7 @@ def lasting(loads: ModalLoads, time: Array) -> ModalLoads:
 
 
 def stiffness_change(loads: ModalLoads) -> tuple[float, float]:
-    """Return the largest relative change |μ| of stiffness by the loads of a run, and −μ of the lowest μ.
+    """The largest relative change |μ| of stiffness by the loads of a run, and −μ of the lowest μ.
 
     The latter is the ratio of loads to buckling loads, exact from 1 on; 0 where no loads soften the link.
     """
@@ -115,7 +115,7 @@ class Missing(NamedTuple):
     of_deflections: float
 
     def grown_to(self, worst: "Missing") -> "Missing":
-        """Return errors raised in proportion to those of the `worst` link, `of_length` at most to its own."""
+        """Errors raised in proportion to those of the `worst` link, `of_length` at most to its own."""
         if not 0.0 < self.of_deflections < worst.of_deflections:
             return self
         in_proportion = self.of_length / self.of_deflections * worst.of_deflections
@@ -123,7 +123,7 @@ class Missing(NamedTuple):
 
 
 def missing_to_first_order(link: ModalBody, T: Array, p: Array, loads: ModalLoads, *, is_at_rest: bool) -> Missing:
-    """Return the errors of a link without geometric stiffening; infinite if loads at rest buckle it.
+    """The errors of a link without geometric stiffening; infinite if loads at rest buckle it.
 
     p (T, n), √kg·m, are modal coordinates of the equations, T p those of the file.
     """
@@ -165,7 +165,7 @@ def _carried(support: LoadedPoint, moved: Array, places: Array) -> Array:
 
 
 def missing_to_second_order(link: ModalBody, p: Array, shortening: float, stiffness_change: float) -> Missing:
-    """Return the errors of a link with geometric stiffening at p (T, n), √kg·m, of the file.
+    """The errors of a link with geometric stiffening at p (T, n), √kg·m, of the file.
 
     By its displacement, `shortening` (by its length), rotations (twist from the root on, bending from the chord), and
     the relative `stiffness_change`.
@@ -182,7 +182,7 @@ def missing_to_second_order(link: ModalBody, p: Array, shortening: float, stiffn
 
 
 def largest_displacement(link: ModalBody, p: Array) -> float:
-    """Return the largest displacement of stations over p (T, n), √kg·m, of the file, relative to the length."""
+    """The largest displacement of stations over p (T, n), √kg·m, of the file, relative to the length."""
     return _largest(p, link.stations.translation) / link.length
 
 
@@ -192,7 +192,7 @@ def _largest(p: Array, shapes: Array) -> float:
 
 
 def largest_lengths(p: Array, shapes: Array) -> Array:
-    """Return the largest |shape · p| (T,), m or rad, of k `shapes` (k, axes, n) at p (T, n), √kg·m.
+    """The largest |shape · p| (T,), m or rad, of k `shapes` (k, axes, n) at p (T, n), √kg·m.
 
     One after the other: all at once may not fit into memory.
     """
@@ -276,7 +276,7 @@ class Bending:
 
 
 def enough_pieces(shortening: float, count: int) -> int:
-    """Return the number of pieces, 2 or more, with which each shortens by at most `ENOUGH` of its length.
+    """The number of pieces, 2 or more, with which each shortens by at most `ENOUGH` of its length.
 
     The relative `shortening` of a link in `count` pieces falls with the square of their number.
     """
@@ -284,7 +284,7 @@ def enough_pieces(shortening: float, count: int) -> int:
 
 
 def link_bending(run: Run, links: Mapping[str, ModalBody]) -> dict[str, Bending]:
-    """Return the measures of deflection of flexible bodies by name; `links` are their modal bodies."""
+    """The measures of deflection of flexible bodies by name; `links` are their modal bodies."""
     loads = loads_in_equations(run, links) if len(run.time) else {}
     return {
         name: _bending_of(run, name, link, loads[name].sizes if name in loads else {}) for name, link in links.items()
@@ -353,7 +353,7 @@ def _on_modes(link: ModalBody, run: Run, node: Node, sizes: Mapping[str, Array])
 
 
 def shape_from_chord(link: ModalBody, p: Array) -> tuple[Array, Array, Array]:
-    """Return largest deflection (m), section rotation (rad) from the chord, foreshortening (m), (T,), at p (T, n).
+    """Largest deflection (m), section rotation (rad) from the chord, foreshortening (m), (T,), at p (T, n).
 
     p: √kg·m, of the file. Slopes along y and z: v' = φ_z, w' = −φ_y.
     """
@@ -372,7 +372,7 @@ def largest(bodies: Mapping[str, Bending]) -> tuple[str, Bending] | None:
 
 
 def deflection_warning(bodies: Mapping[str, Bending]) -> str:
-    """Return the warning on links that bend too much; empty if none does."""
+    """The warning on links that bend too much; empty if none does."""
     worst = largest(bodies)
     if worst is None or not worst[1].is_beyond:
         return ""
