@@ -1,5 +1,6 @@
 """Keys of link files of beams and solids, as tests of all parts write them, and their modal bodies."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -56,3 +57,10 @@ def flexibility(body, name, other=None):
     """(6, 6) displacement and rotation of an interface under unit force and moment at another one, or there."""
     at, load = body.interfaces[name], body.interfaces[other or name]
     return at.motion / np.diag(body.stiffness) @ load.motion.T
+
+
+def moved(body, x):
+    """The modal body with its points, but not its integrals, `x` m away from the origin, as of other programs."""
+    parts = {"stations": body.stations} | body.interfaces
+    at = {name: replace(part, position=part.position + x * np.eye(3)[0]) for name, part in parts.items()}
+    return replace(body, stations=at.pop("stations"), interfaces=at)

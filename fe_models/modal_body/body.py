@@ -153,8 +153,15 @@ class ModalBody(Integrals, Frozen):
 
     @property
     def middle(self) -> float:
-        """Place x, m, half way from root to tip."""
-        return float(self.interfaces["root"].position[0]) + self.length / 2
+        """Place x, m, half way along the link."""
+        return self.begin + self.length / 2
+
+    @property
+    def begin(self) -> float:
+        """Place x, m, from which distances on the axis count: the first station, or the root if stations go beyond."""
+        first, last = self.stations.position[[0, -1], 0]
+        is_first = abs(self.length - last + first) <= INTERFACE_TOLERANCE * self.length
+        return float(first if is_first else self.interfaces["root"].position[0])
 
     def interpolate(self, x: float) -> Interface:
         """Mode shapes at the place `x`, m, on the axis of the link.
@@ -171,7 +178,7 @@ class ModalBody(Integrals, Frozen):
         return Interface(position[0], translation[0], rotation[0])
 
     def along_axis(self, x: Array) -> AlongAxis:
-        """Mode shapes at points `x` (q,) on the axis, m from the root; interpolation and errors as in `interpolate`."""
+        """Mode shapes at places `x` (q,), m, on the axis; interpolation and errors as in `interpolate`."""
         positions = self.stations.position[:, 0]
         slack = 1e-9 * self.length
         outside = x[~((positions[0] - slack <= x) & (x <= positions[-1] + slack))]

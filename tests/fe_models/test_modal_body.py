@@ -6,6 +6,7 @@ from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
+from beam_links import moved
 
 from ffrobot.common.errors import InputError
 from ffrobot.fe_models.modal_body import Interface, ModalBody, PictureMesh, Stations
@@ -74,15 +75,14 @@ def test_interpolation_reproduces_cubics(body, coefficients, element):
         np.testing.assert_allclose(found.rotation, rotation[0], atol=1e-12)
 
 
-def test_the_middle_lies_between_root_and_tip(body):
-    """Also where the origin is elsewhere, as in bodies of other programs."""
-    away = np.array([2.0, 0.0, 0.0])
-    stations = replace(body.stations, position=body.stations.position + away)
-    ends = {name: replace(at, position=at.position + away) for name, at in body.interfaces.items()}
-    moved = replace(body, stations=stations, interfaces=ends)
-    here, there = body.interpolate(0.7), moved.interpolate(moved.middle)
-    np.testing.assert_allclose(there.position, here.position + away, atol=1e-15)
+def test_the_middle_lies_half_way_along_the_link(body):
+    """Also where the origin is elsewhere, as in bodies of other programs, or the root is a face beside the end."""
+    here, away = body.interpolate(0.7), moved(body, 2.0)
+    there = away.interpolate(away.middle)
+    np.testing.assert_allclose(there.position, np.array([2.7, 0.0, 0.0]), atol=1e-15)
     np.testing.assert_allclose(there.translation, here.translation, rtol=1e-12)
+    root = replace(body.interfaces["root"], position=np.array([0.7, -0.01, 0.0]))
+    assert replace(body, interfaces={**body.interfaces, "root": root}).middle == 0.7
 
 
 def test_hermite_interpolation_needs_no_smoothness_between_stations(body):
