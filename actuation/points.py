@@ -152,10 +152,9 @@ def with_points(spatial: Body, chosen: PointSet) -> Body:
 def _automatic(name: str, body: ModalBody | None, spatial: Body, axes: str) -> PointSet:
     """Of all components at the stations of a link, or the points of a rigid body, the first in QR with pivoting."""
     if body is not None:
-        places: list[Place] = np.unique(body.stations.position[:, 0]).tolist()
-    elif not (places := list(spatial.points)):
+        points = [_section(x, body, spatial) for x in body.stations.position[:, 0]]
+    elif not (points := list(spatial.points.values())):
         raise InputError("expected a rigid body with points", "none")
-    points = [_point(place, body, spatial) for place in places]
     candidates = _named(name, tuple(axis for axis in axes for _ in points), points * len(axes), spatial)
     _, R, order = scipy.linalg.qr(candidates.scaled(np.zeros((1, spatial.n_modes)))[0], mode="economic", pivoting=True)
     sizes = np.abs(np.diag(R))
@@ -182,7 +181,11 @@ def _point(place: Place, body: ModalBody | None, spatial: Body) -> BodyPoint:
     slack = 1e-9 * body.length
     if not -slack <= place <= body.length + slack:
         raise InputError(f"expected places within the link, 0 … {body.length:g} m", f"{place:g} m")
-    at, T = body.interpolate(place), spatial.modal_transform
+    return _section(body.begin + place, body, spatial)
+
+
+def _section(x: float, body: ModalBody, spatial: Body) -> BodyPoint:
+    at, T = body.interpolate(x), spatial.modal_transform
     return BodyPoint(at.position, at.translation @ T, at.rotation @ T)
 
 

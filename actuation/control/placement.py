@@ -27,7 +27,7 @@ from ...mbs.run.record import Details, Run
 from ...mbs.scene.analysis import Surroundings
 from ..context import ActuatedContext
 from ..patches.link_patches import link_patches
-from ..patches.patches import SINGULAR, PatchArray
+from ..patches.patches import SINGULAR, PatchArray, patch_edges
 from ..patches.records import PztLayout
 from .linear_model import LinearModel, state_space
 from .observer import kalman, model_of_filter
@@ -152,7 +152,7 @@ def place(
     indices, sets, method = _search(room, gap * np.arange(count), wanted.most_sets, lambda i: judge(Phi_V[:, i], C[i]))
     found = [
         (centers[indices], Phi_V[:, indices], C[indices]),
-        (even.edges.mean(axis=1), even.Phi_V, even.effects.capacitance.diagonal()),
+        (patch_edges(even.layout, even.link.length).mean(axis=1), even.Phi_V, even.effects.capacitance.diagonal()),
     ]
     rated = [Evaluation(x, gain(P).sum(axis=1), float(judge(P[:, None], of[None])[0])) for x, P, of in found]
     voltages = [np.nan if F_p is None else float(_voltages(shape, P[:, None], F_p)[0]) for _, P, _ in found]

@@ -43,14 +43,14 @@ GAUSS_POINTS = 4  # products of the cubics of an element are of degree 6
 
 
 class PlacedLayout(NamedTuple):
-    """A layout with the begin and end of its k patches, `edges` (k, 2), m from the root."""
+    """A layout with the begin and end of its k patches, x (k, 2) in m, `edges`."""
 
     layout: PztLayout
     edges: Array
 
 
 class GaussPoint(NamedTuple):
-    """Gauss point at x (m from the root) in interval no. `interval`, its weight (m), index of the station before it."""
+    """Gauss point at x (m) in interval no. `interval`, its weight (m), index of the station before it."""
 
     interval: int
     x: float
@@ -142,7 +142,7 @@ def stiffness_ratios(placed: PlacedLayout, body: ModalBody) -> tuple[Array, Arra
     found = np.zeros((2, len(edges)))
     for at in gauss_points(body, edges):
         found[:, at.interval] += at.weight * ratios(int(sections.alike[at.station]))
-    psi, authority = found / np.diff(edges.clip(0.0, body.length))[:, 0]
+    psi, authority = found / np.diff(edges)[:, 0]
     return psi, authority
 
 
@@ -150,7 +150,7 @@ def gauss_points(body: ModalBody, intervals: Array) -> Iterator[GaussPoint]:
     """Yield Gauss points along `intervals` (m, 2), m, split at stations, where shapes have kinks and sections steps."""
     nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)  # type: ignore[no-untyped-call, unused-ignore]
     stations = body.stations.position[:, 0]
-    for number, (start, end) in enumerate(intervals.clip(0.0, body.length)):
+    for number, (start, end) in enumerate(intervals):
         slack = SLIVER * (end - start)
         inside = stations[(stations > start + slack) & (stations < end - slack)]
         for a, b in np.lib.stride_tricks.sliding_window_view(np.concatenate([[start], inside, [end]]), 2):
@@ -311,10 +311,10 @@ def _stretches(
     cut[:, :-1] &= last[:, :-1] | (jumps > 1e-9)
     patch, stations = np.nonzero(cut)
     is_last = last[patch, stations]
-    found = np.where(is_last, np.minimum(ends, body.length)[patch], x[stations + 1])
+    found = np.where(is_last, ends[patch], x[stations + 1])
     first = np.append(0, np.flatnonzero(is_last)[:-1] + 1)
     begin = np.append(0.0, found[:-1])
-    begin[first] = np.maximum(starts, 0.0)
+    begin[first] = starts
     return begin, found, stations, first
 
 
@@ -327,7 +327,7 @@ def _outlined(layout: PztLayout, body: ModalBody, edges: Array) -> Array:
             '"surface" and none outlined',
         )
     found = (*edges.ravel(), layout.width)
-    outlined = (*patches.edges.ravel(), patches.width)
+    outlined = (*(body.begin + patches.edges).ravel(), patches.width)
     if len(found) != len(outlined) or not np.allclose(found, outlined, rtol=0.0, atol=1e-6 * body.length):
         raise InputError(
             f"coupling: expected the {len(patches.edges)} patches that the link file outlines, from"

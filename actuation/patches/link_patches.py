@@ -93,7 +93,7 @@ class LinkPatches:
 
     @property
     def edges(self) -> Array:
-        """Where the patches begin and end (k, 2), m from the root."""
+        """Where the patches begin and end, x (k, 2) in m."""
         return np.concatenate([array.edges for array in self.arrays.values()])
 
     def at_voltages(self, V: Array, F_p: Array) -> dict[str, Voltages]:
@@ -166,6 +166,7 @@ def placed_patches(layouts: Sequence[PztLayout], body: ModalBody) -> list[Placed
         with naming(_key(layout)):
             check_sections(body, layout.normal, twists=layout.fibre_angle is not None)
             check_edges(edges, body.length)
+            edges = body.begin + edges.clip(0.0, body.length)
             check_width(body, layout, edges)
         across = link_sections(body).extent("z" if layout.normal == "y" else "y")
         is_wide = layout.coupling == "surface" or bool(np.nanmax(across, initial=0.0) >= WIDE * body.length)

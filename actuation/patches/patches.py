@@ -203,7 +203,7 @@ class PatchArray(Reach):
     """The patches of one layout."""
 
     layout: PztLayout  # the keys of the scene
-    edges: Array  # (k, 2) where each patch begins and ends along the link, m
+    edges: Array  # (k, 2) x where each patch begins and ends, m
     effects: Effects  # effects on the modes of the `link`
     link: ModalBody  # modal body of the link
 

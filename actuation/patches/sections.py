@@ -26,7 +26,7 @@ ROUND = 1e-6  # of the radius: corners of an outline that are so far from the ax
 class LinkSections:
     """Section properties of a link from each of its k stations on; NaN if unknown."""
 
-    x: Array  # (k,) m from the root
+    x: Array  # (k,) m
     # (k,) along y and z, m
     height: Array
     width: Array
@@ -103,7 +103,7 @@ def check_sections(body: ModalBody, normal: Literal["y", "z"], *, twists: bool) 
 
 
 def check_width(body: ModalBody, layout: PztLayout, edges: Array) -> None:
-    """Raise `InputError` for patches between `edges` (k, 2), m, that are wider than the face that they lie on."""
+    """Raise `InputError` for patches between x `edges` (k, 2), m, that are wider than the face that they lie on."""
     sections = link_sections(body)
     x, across = sections.x, sections.extent("z" if layout.normal == "y" else "y")
     ends = np.append(x[1:], np.inf)

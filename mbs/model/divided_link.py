@@ -71,7 +71,7 @@ def spread_of(link: ModalBody, pieces: Sequence[tuple[float, ModalBody]]) -> Arr
 
 def _shape_in_piece(link: ModalBody, start: float, piece: ModalBody) -> Array:
     x = np.linspace(0.0, piece.length, INTERVALS + 1)
-    of_link = _changes(link, np.minimum(start + x, link.length))
+    of_link = _changes(link, link.begin + start + x)
     return np.linalg.lstsq(_changes(piece, x), of_link, rcond=None)[0]
 
 

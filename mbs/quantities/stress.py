@@ -59,7 +59,7 @@ class BodyStress:
 class SectionLoads:
     """Moments and forces on the sections of a link under k patches, by layers such as patches that stiffen it."""
 
-    edges: Array  # (k, 2) where each patch begins and ends, m from the root
+    edges: Array  # (k, 2) x where each patch begins and ends, m
     patch: Integers  # (g,) number of the patch of each place, from 0
     x: Array  # (g,) the places, ascending within a patch, m
     moment: Array  # (T, g) of the section at each place, N·m, positive with φ'
@@ -153,7 +153,7 @@ def _surface_cases(body: ModalBody, recovery: Recovery) -> Array:
 
 
 def _cases(body: ModalBody, recovery: Recovery, x: Array, modal: Array, static: Array | None) -> Array:
-    """(m, 6, n + l + …) stresses at m places x (m from the root) of all that `recovery` has sizes of.
+    """(m, 6, n + l + …) stresses at m places x (m) of all that `recovery` has sizes of.
 
     Unit loads that pull at both ends, or bend them, are the unit force and moment in every section.
     """

@@ -33,7 +33,7 @@ class PatchedLink(Protocol):
 
     @property
     def edges(self) -> Array:
-        """Begin and end (k, 2) of patches, m from the root of the link."""
+        """Begin and end of patches, x (k, 2) in m."""
 
     @property
     def slowness(self) -> float:

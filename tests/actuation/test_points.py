@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from patches_on_links import planar_body
+from beam_links import moved
+from patches_on_links import patches, planar_body
 
 from ffrobot.actuation.points import ActuationPoints, make_point_set, with_points
 from ffrobot.common.errors import InputError
@@ -39,6 +40,15 @@ def test_a_body_whose_points_cannot_carry_everything(cantilever):
     doubled = replace(planar, modal_transform=planar.modal_transform[:, twin], stiffness=planar.stiffness[twin])
     with pytest.raises(InputError, match="expected points that carry all 7 generalized forces of the body, found 6"):
         chosen(cantilever(4), doubled)
+
+
+def test_distances_count_from_the_root_wherever_the_origin_is(cantilever):
+    body, away = cantilever(4), moved(cantilever(4), -0.3)
+    here, there = (chosen(link, axial=(0.2,), transverse=(0.5, "tip")) for link in (body, away))
+    for point, other in zip(here.points, there.points, strict=True):
+        np.testing.assert_allclose(other.translation, point.translation, atol=1e-12)
+    assert len(chosen(away).points) == len(chosen(body).points)
+    np.testing.assert_allclose(patches(away).Phi_V, patches(body).Phi_V, rtol=1e-9)
 
 
 @pytest.mark.parametrize(
