@@ -79,14 +79,14 @@ def _of_skew(vectors: Array, first: int, second: int) -> Array:
 
 
 def of_quaternion(e: Array) -> Array:
-    """The rotation matrices (…, 3, 3) of unit quaternions e (…, 4)."""
+    """The rotation matrices (…, 3, 3) of unit quaternions e (…, 4), no unit."""
     e0, v = e[..., 0, None, None], e[..., 1:]
     outer = v[..., :, None] * v[..., None, :]
     return (e0**2 - np.sum(v * v, axis=-1)[..., None, None]) * np.eye(3) + 2 * outer + 2 * e0 * skew(v)
 
 
 def quaternions(C: Array) -> Array:
-    """Unit quaternions (…, 4), e0 ≥ 0, of rotation matrices (…, 3, 3) by the largest component (Shepperd 1978)."""
+    """Unit quaternions (…, 4), e0 ≥ 0, of matrices (…, 3, 3), no unit, by the largest component (Shepperd 1978)."""
     trace = np.trace(C, axis1=-2, axis2=-1)
     diagonal = np.diagonal(C, axis1=-2, axis2=-1)
     squares = np.concatenate([1 + trace[..., None], 1 - trace[..., None] + 2 * diagonal], axis=-1)
@@ -128,7 +128,7 @@ def of_rpy(roll: float, pitch: float, yaw: float) -> Array:
 
 
 def rpy_of(C: Array) -> list[float]:
-    """Roll, pitch, yaw, rad, about fixed axes of a rotation (3, 3), `of_rpy` back: pitch within ±π/2."""
+    """Roll, pitch, yaw, rad, about fixed axes of a rotation matrix (3, 3), `of_rpy` back: pitch within ±π/2."""
     across = float(np.hypot(C[0, 0], C[1, 0]))
     yaw = float(np.arctan2(C[1, 0], C[0, 0])) if across > 1e-9 else 0.0  # else about the same axis as roll
     B = about(2, yaw).T @ C
@@ -143,7 +143,7 @@ def unit(vector: Array) -> Array:
 
 
 def smallest_turn(axis: Array) -> Array:
-    """Matrix (3, 3) of the smallest rotation that brings z onto `axis` (3,), any length; for −z a half turn about x."""
+    """Matrix (3, 3) of the smallest rotation that brings z onto `axis` (3,), any unit; for −z a half turn about x."""
     z = unit(np.asarray(axis, dtype=float))
     S, cosine, square = skew(np.cross([0.0, 0.0, 1.0], z)), z[2], z[0] ** 2 + z[1] ** 2  # Rodrigues: S = sin φ n~
     if cosine > 0.0:

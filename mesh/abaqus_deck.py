@@ -41,7 +41,7 @@ class Keyword:
                 yield entries, line.place
 
     def option(self, name: str) -> str:
-        """Return a required option. Raises `InputError` if it is missing."""
+        """A required option. Raises `InputError` if it is missing."""
         if not self.options.get(name):
             raise InputError(f"{self}: expected {name}=…", "none")
         return self.options[name]
@@ -114,7 +114,7 @@ class Sets:
     of_instances: "Mapping[str, Sets]" = field(default_factory=dict)
 
     def copy(self) -> "Sets":
-        """Return a copy, to which members can be added."""
+        """A copy, to which members can be added."""
         return Sets(self.what, {name: list(of) for name, of in self.members.items()}, dict(self.spelled))
 
     def add(self, name: str, entries: Iterable[tuple[str, str | int, str]]) -> None:
@@ -206,7 +206,7 @@ class Scope:
     faces: dict[str, Keyword] = field(default_factory=dict)
 
     def copy(self) -> "Scope":
-        """Return a copy, to which content can be added."""
+        """A copy, to which content can be added."""
         return replace(self, **{name: of.copy() for name, of in vars(self).items() if name not in ("frame", "place")})
 
     def read(self, keyword: Keyword) -> bool:

@@ -134,7 +134,7 @@ def volume_and_center(nodes: Array, cell: CellName, degree: int) -> tuple[float,
 
 
 def cell_quality(corners: Array, cell: CellName) -> Array:
-    """Return quality (c,) of cells with `corners` (c, v, 3), m: 1 for regular tetrahedra and cubes, 0 for flat cells.
+    """Quality (c,) of cells with `corners` (c, v, 3), m: 1 for regular tetrahedra and cubes, 0 for flat cells.
 
     Volume of a tetrahedron relative to that of the regular one with the same mean square edge; smallest determinant of
     a hexahedron's Jacobian relative to the product of its edges.

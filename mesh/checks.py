@@ -29,7 +29,7 @@ _LENGTHS = (0.2, 5.0)
 
 
 def check_size(size: float, volume: float) -> float:
-    """Return the number of tetrahedra of `size` (m) in `volume` (m³). Raises `InputError` above `MOST_CELLS`."""
+    """The number of tetrahedra of `size` (m) in `volume` (m³). Raises `InputError` above `MOST_CELLS`."""
     cubes = volume / size**3
     side = cubes ** (1 / 3) * size
     count = 6 * 2**0.5 * cubes  # regular tetrahedra
@@ -142,7 +142,7 @@ def check_boundary(part: PartMesh) -> None:
 
 
 def oriented(part: PartMesh) -> PartMesh:
-    """Return `part`, its cells mirrored if all of them are left-handed, as some formats number them."""
+    """`part`, its cells mirrored if all of them are left-handed, as some formats number them."""
     at_corners = jacobians(part.points[part.corners], part.cell, 1, part.shape.corners)
     if np.all(np.linalg.det(at_corners) < 0):  # others may be curved too much
         nodes = reference_nodes(part.cell, part.degree)
@@ -164,7 +164,7 @@ def check_quality(part: PartMesh) -> None:
 
 
 def straightened(part: PartMesh) -> PartMesh:
-    """Return `part` with mid-side nodes moved towards the middle of their edges until no curved cell is inverted.
+    """`part` with mid-side nodes moved towards the middle of their edges until no curved cell is inverted.
 
     Where a coarse cell has two edges on one smooth curve its corner between them is (nearly) flat.
     """

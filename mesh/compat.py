@@ -88,7 +88,7 @@ def cell_name(mesh: Mesh) -> str:
 
 
 def geometry_nodes(mesh: Mesh) -> Integers:
-    """Return v nodes (c, v) of each local cell, rows of `mesh.geometry.x`, in dolfinx's order; corners first."""
+    """The nodes (c, v) of each local cell, rows of `mesh.geometry.x`, in dolfinx's order; corners first."""
     dofmap = mesh.geometry.dofmap
     cells = mesh.topology.index_map(mesh.topology.dim).size_local
     if not _OLD:
@@ -104,7 +104,7 @@ def coordinate_element(mesh: Mesh) -> basix.finite_element.FiniteElement:
 
 
 def compiled_form(form: ufl.Form) -> "fem.Form":
-    """Return `form` compiled, ready to be assembled."""
+    """`form` compiled, ready to be assembled."""
     with _compiling(form.ufl_domain().ufl_cargo().comm) as jit:
         return fem.form(form, **jit)
 

@@ -112,7 +112,7 @@ class SmoothFace:
 
 
 def named_faces(source: Source, tables: PartTables) -> PartMesh:
-    """Return the part of `source`, in the link's frame, with tags of root, tip and the faces that `tables` name.
+    """The part of `source`, in the link's frame, with tags of root, tip and the faces that `tables` name.
 
     Raises `InputError`, with the faces that the part has, if a face is missing or two overlap.
     """

@@ -38,7 +38,7 @@ class Frame:
         return cls(origin, np.stack([unit.get(axis, c) for axis in "xyz"], axis=1), kind)
 
     def points(self, coordinates: Array) -> Array:
-        """Return global coordinates (p, 3) of points with `coordinates` (p, 3) in this frame, in the file's unit."""
+        """Global coordinates (p, 3) of points with `coordinates` (p, 3) in this frame, in the file's unit."""
         a, b, c = np.asarray(coordinates, dtype=np.float64).T
         if self.kind == "rectangular":
             local = np.stack([a, b, c], axis=1)

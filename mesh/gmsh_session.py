@@ -62,7 +62,7 @@ def _stdout_captured() -> Iterator[Callable[[], str]]:
 
 
 def volume_and_surface() -> tuple[float, float]:
-    """Return volume of the gmsh model and area of its faces, in the model's units."""
+    """Volume of the gmsh model and area of its faces, in the model's units."""
     occ = gmsh.model.occ
     faces = gmsh.model.getBoundary(gmsh.model.getEntities(3), combined=True, oriented=False)
     return sum(occ.getMass(*e) for e in gmsh.model.getEntities(3)), sum(occ.getMass(*e) for e in faces)

@@ -39,7 +39,7 @@ class Line(NamedTuple):
 
 
 def files_of(path: Path) -> list[Path]:
-    """Return `path` and the existing files that it includes or that belong to it, in order."""
+    """`path` and the existing files that it includes or that belong to it, in order."""
     pattern = _REFERENCES.get(path.suffix.lower())
     files: dict[Path, None] = {}
 
@@ -59,7 +59,7 @@ def files_of(path: Path) -> list[Path]:
 
 
 def text_of(file: Path) -> str:
-    """Return the text of a file in UTF-8, or in UTF-16 if a byte order mark declares it."""
+    """The text of a file in UTF-8, or in UTF-16 if a byte order mark declares it."""
     content = file.read_bytes()
     encoding = "utf-16" if content.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig"
     return content.decode(encoding, errors="replace")

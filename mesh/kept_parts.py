@@ -45,7 +45,7 @@ def geometry_content(geometry: SolidGeometry) -> dict[str, Any]:
 
 
 def kept_path(tables: PartTables) -> Path:
-    """Return the path of a part's mesh in the cache, existing or not."""
+    """The path of a part's mesh in the cache, existing or not."""
     file = tables.geometry.file
     content = {
         "code": digest_of_mesh_code(),

@@ -34,7 +34,7 @@ Progress = Callable[[str], None]
 
 
 def kept_or_new(tables: PartTables, progress: Progress, *, remesh: bool) -> PartMesh:
-    """Return the mesh of a part (`part_mesh`); if gmsh makes it, an earlier one in the cache unless `remesh`."""
+    """The mesh of a part (`part_mesh`); if gmsh makes it, an earlier one in the cache unless `remesh`."""
     if not _is_meshed(tables):
         return part_mesh(tables, progress)
     kept = kept_path(tables)

@@ -56,11 +56,11 @@ class PartMesh:
         return np.unique(facet_keys(self.cell_facets, len(self.points)), return_inverse=True)[1].reshape(-1)
 
     def tags_of(self, region: str) -> tuple[int, ...]:
-        """Return the tags in `cell_tag` of all cells of a volume group."""
+        """The tags in `cell_tag` of all cells of a volume group."""
         return self.regions[region], *self.overlaps.get(region, ())
 
     def moved(self, points: Array) -> "PartMesh":
-        """Return the mesh with other `points` (p, 3), m."""
+        """The mesh with other `points` (p, 3), m."""
         return replace(self, points=points)
 
 
@@ -94,5 +94,5 @@ def facet_geometry(points: Array, facets: Integers) -> tuple[Array, Array, Array
 
 
 def show(vector: Array) -> str:
-    """Return a point, m, or a direction (3,) as text, without digits below a micrometer."""
+    """A point, m, or a direction (3,) as text, without digits below a micrometer."""
     return f"({', '.join(f'{value:.4g}' for value in np.round(vector, 6) + 0.0)})"  # −0 is 0

@@ -81,7 +81,7 @@ class _Cells:
         self.affine = self.tetrahedral and mesh.geometry.cmap.degree == 1
 
     def basis(self, X: Array, derivatives: int) -> Array:
-        """Return values, and derivatives along X, of the shape functions at `X` (q, 3): (1 or 4, q, v)."""
+        """Values, and derivatives along X, of the shape functions at `X` (q, 3): (1 or 4, q, v)."""
         return self.element.tabulate(derivatives, X)[..., 0]
 
     def distance(self, cell: Integers, X: Array) -> tuple[Array, Array]:

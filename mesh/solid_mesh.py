@@ -40,7 +40,7 @@ class Surface:
 
 
 def boundary(mesh: Mesh) -> tuple[Integers, Integers, Integers]:
-    """Return the b boundary facets (b,) of this process, ascending, their cells (b,) and local numbers in them (b,)."""
+    """The b boundary facets (b,) of this process, ascending, their cells (b,) and local numbers in them (b,)."""
     mesh.topology.create_connectivity(2, 3)
     mesh.topology.create_connectivity(3, 2)
     facets = np.sort(np.asarray(exterior_facet_indices(mesh.topology), dtype=np.int64))
@@ -51,7 +51,7 @@ def boundary(mesh: Mesh) -> tuple[Integers, Integers, Integers]:
 
 
 def reference_facets(mesh: Mesh) -> Integers:
-    """Return numbers (m, 3 or 4) of the corners of the reference cell's m facets, in dolfinx's order."""
+    """Numbers (m, 3 or 4) of the corners of the reference cell's m facets, in dolfinx's order."""
     return np.array(basix.topology(coordinate_element(mesh).cell_type)[2])
 
 

@@ -36,7 +36,7 @@ COINCIDENT = 1e-9
 
 
 def graded_nodes(breakpoints: Sequence[float], elements: int) -> Array:
-    """Return ascending nodes (elements + 1,), m, with a node at each of `breakpoints` (s + 1,), m, of s segments.
+    """Ascending nodes (elements + 1,), m, with a node at each of `breakpoints` (s + 1,), m, of s segments.
 
     Elements of a segment are equal, the longest of all is as short as possible: a uniform mesh that meets all
     breakpoints stays. Raises `ValueError` for fewer elements than segments.
@@ -54,7 +54,7 @@ def graded_nodes(breakpoints: Sequence[float], elements: int) -> Array:
 
 
 def with_points(nodes: Array, points: Sequence[float]) -> Array:
-    """Return `nodes` (k,), m, and `points`, m, in one ascending array; points that coincide with nodes add nothing."""
+    """`nodes` (k,), m, and `points`, m, in one ascending array; points that coincide with nodes add nothing."""
     length = nodes[-1] - nodes[0]
     for point in points:
         if np.min(np.abs(nodes - point)) > COINCIDENT * length:

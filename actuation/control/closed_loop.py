@@ -368,9 +368,9 @@ SAME = 1e-3  # of the largest response: what the states found may leave of it
 def find_feedback(setup: Setup, controllers: Sequence[Controller], readings: Array, first: int) -> Feedback | None:
     """Linearize controllers about the reference from sample `first` on; None if nonlinear, changing, or of many states.
 
-    Each reading deviates at one sample, by much less than `readings` (K, outputs) of a run. The Hankel matrix of the
-    commands' response has the controllers' states as factors (B. L. Ho and R. E. Kalman, Regelungstechnik 14, 1966; S.
-    Y. Kung, Asilomar Conf. 1978).
+    Each reading deviates at one sample, by much less than `readings` (K, outputs), in units of sensors, of a run. The
+    Hankel matrix of the commands' response has the controllers' states as factors (B. L. Ho and R. E. Kalman,
+    Regelungstechnik 14, 1966; S. Y. Kung, Asilomar Conf. 1978).
     """
     count = min(LONGEST, len(setup.times) - first)
     if count < FEWEST:

@@ -76,7 +76,7 @@ class Placed(Details):
     share: Array  # (modes,) share, no unit, of their strain energy that is in the link
     largest_voltage: Array  # (2,) V of best and even over the path; nan without a path
     candidates: Array  # (k,) m, centers that were allowed
-    candidate_reach: Array  # (modes, k) `Evaluation.reach` of a single patch there
+    candidate_reach: Array  # (modes, k), no unit, `Evaluation.reach` of a single patch there
     sets: int  # how many sets of patches were compared
     method: str  # "all sets" or "evolution"
 

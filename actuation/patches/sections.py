@@ -149,7 +149,7 @@ def across_row(layout: PztLayout) -> int:
 
 
 def felt_rows(layout: PztLayout) -> Indices:
-    """Return indices (any,) in e of strains that interact with the patches."""
+    """Return indices (any,) in strains e (see `layer_loads`) of those that interact with the patches."""
     if layout.face is None:
         return np.array([own_row(layout)])
     return np.flatnonzero([True, True, layout.lamina.shears, True])

@@ -140,7 +140,7 @@ def section_forces(link: BeamLink, x: Array, interfaces: Mapping[str, float], ro
 
 
 def of_load(load: Array, arm: Array) -> Array:
-    """Return force, N, and moment, N·m (6, …, g), of such a `load` (6, …, 1 or g) `arm` (g,), m, further along x."""
+    """Force, N, and moment, N·m (6, …, g), of such a `load` (6, …, 1 or g) that acts `arm` (g,), m, further along x."""
     force, moment = load[:3] * np.ones_like(arm), load[3:]
     return np.concatenate([force, moment + _lever(force * arm)])
 

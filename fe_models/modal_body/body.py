@@ -62,21 +62,21 @@ class ModalBody(Integrals, Frozen):
         frequency: (n,) in Hz.
         stiffness: (n, n) K_ff = diag(ω²) in rad²/s².
         modal_mass: (n, n) m_ff = I to 1e-8.
-        damping_ratio: (n,) ζ.
+        damping_ratio: (n,) ζ, no unit.
         damping_of: "link", or "robot" if ζ refers to the vibrations of the assembled robot.
         family: n names; of a residual attachment mode, that of the loads behind it.
         residual: (n,) 0 of eigenmodes, 1 of residual attachment modes, which come after them; all 0 where not given.
         J_spin: J_s = ∫ρI_p dx in kg·m² of lines of mass about their axis, not in `second_moment`; None: unknown.
         h_spin: (n,) h_s = ∫ρI_p φ dx in m·√kg, with φ the twist of the modes.
-        S_spin: (n, n) S_s = ∫ρI_p φᵀφ dx; `S_bar_kl` holds it once more at [2, 2], where the plane needs it.
-        geometric_stiffness: (n, n) for each unit load, by its name.
+        S_spin: (n, n) S_s = ∫ρI_p φᵀφ dx, no unit; `S_bar_kl` holds it once more at [2, 2], where the plane needs it.
+        geometric_stiffness: (n, n), rad²/s² per unit of load, by the load's name.
         interfaces: by name; `root` and `tip` always.
         stations: along the axis.
         mesh: for pictures.
         stress: modal stresses by the name of their point, if the link file has any.
-        surface_stress: (p, 6, n) stress at the points of `mesh`, as in `StressPoint`; None unless requested.
+        surface_stress: (p, 6, n) Pa per mode, at the points of `mesh`, as in `StressPoint`; None unless requested.
         stress_loads: names of the l unit loads (`unit_loads`) whose static stresses are known; none in old files.
-        surface_static: (p, 6, l) likewise, as `static` in `StressPoint`.
+        surface_static: (p, 6, l) Pa per unit of load, likewise, as `static` in `StressPoint`.
         surface_patches: modal forces of patches outlined in the mesh; None where there are none.
         measured: marks of measured frequencies and damping ratios; None: all computed.
         input_hash: of the link file's content.

@@ -47,7 +47,7 @@ ALONE = 1e-12  # eigenvalues of flexibility, each scaled to 1: less is of interf
 
 
 class FixedInterfaceFlexibility:
-    """F − F Bᵀ (B F Bᵀ)⁻¹ B F: displacements u, m, under loads with interfaces fixed, B u = 0, B (k, m) the `rows`.
+    """F − F Bᵀ (B F Bᵀ)⁻¹ B F: displacements u, m, under loads with interfaces fixed, B u = 0, B (k, m) the `rows`, SI.
 
     F is the `flexibility`, of a `rank`, under the supports of the root. Of vectors that several processes share, each
     has its own m entries; `total` sums an array over the processes.

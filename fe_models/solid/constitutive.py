@@ -9,7 +9,7 @@ from ..link_records.link import Material, OrthotropicMaterial
 
 
 def stiffness(material: Material | OrthotropicMaterial) -> Array:
-    """Return C (6, 6), σ = C ε, Pa; rows σ_xx, σ_yy, σ_zz, σ_yz, σ_xz, σ_xy, columns ε_xx … and 2ε_yz, 2ε_xz, 2ε_xy.
+    """C (6, 6), σ = C ε, Pa; rows σ_xx, σ_yy, σ_zz, σ_yz, σ_xz, σ_xy, columns ε_xx … and 2ε_yz, 2ε_xz, 2ε_xy.
 
     Inverse of the compliance of Jones, Mechanics of Composite Materials (1999), eq. 2.26; equal constants if isotropic.
     """

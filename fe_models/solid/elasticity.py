@@ -119,7 +119,7 @@ class SolidModel:
 class MassMatrix:
     """Mass operator M u + Σ Bᵀ diag(w) B u: the mesh, and masses attached to interfaces.
 
-    `attached` has for each such mass B (6, 3 owned), the mean motion of its interface, and w (6,), kg and kg·m².
+    `attached`: for each such mass B (6, 3 owned), SI, the mean motion of its interface, and w (6,), kg and kg·m².
     """
 
     def __init__(self, model: SolidModel, attached: Sequence[tuple[Array, Array]]) -> None:
@@ -147,7 +147,7 @@ def material_map(
 
 
 def solid_model(mesh: Mesh, order: int, materials: MaterialMap) -> SolidModel:
-    """Return space, mass matrix and stiffness form of a solid, displacements of `order`, for `stiffness_matrix`."""
+    """Space, mass matrix and stiffness form of a solid, displacements of `order`, for `stiffness_matrix`."""
     V, S = function_space(mesh, order, (3,)), function_space(mesh, order)
     nodes = node_map(V)
     assert np.array_equal(nodes, node_map(S)), "scalar and vector space number their nodes alike"

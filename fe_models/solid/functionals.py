@@ -40,7 +40,7 @@ class Averages:
     density: Array  # (k,) mean density in kg/m³
 
     def of(self, model: SolidModel, modes: Array) -> tuple[Array, Array]:
-        """Return mean translation, m, and rotation, rad, (k, 3, n) each, of `modes` (3 owned, n), m; collective."""
+        """Mean translation, m, and rotation, rad, (k, 3, n) each, of `modes` (3 owned, n), m; collective."""
         n = modes.shape[1]
         moments = model.total(self.weights @ model.with_ghosts(modes).reshape(-1, 3 * n)).reshape(-1, 4, 3, n)
         translation = moments[:, 0] / self.area[:, None, None]

@@ -23,7 +23,7 @@ from .supports import Flexibility
 
 
 def shape_integrals(model: SolidModel, modes: Array) -> Invariants:
-    """Return the integrals, SI, of the part alone for `modes` (3 owned, n), 1/√kg; no spin inertia; collective."""
+    """The integrals, SI, of the part alone for `modes` (3 owned, n), 1/√kg; no spin inertia; collective."""
     n, x = modes.shape[1], model.x
     Phi = modes.reshape(-1, 3, n)
     M_Phi = (model.mass @ modes).reshape(-1, 3, n)
@@ -45,7 +45,7 @@ def shape_integrals(model: SolidModel, modes: Array) -> Invariants:
 
 
 def unit_loads(model: SolidModel, interfaces: Mapping[str, Array]) -> Array:
-    """Return consistent nodal forces (3 owned, l), N per unit, of the l unit loads of a link; collective.
+    """Consistent nodal forces (3 owned, l), N per unit, of the l unit loads of a link; collective.
 
     They are d'Alembert forces, and forces and moments at `interfaces`, spread by the transpose of their mean motion B
     (6, 3 owned), m and rad per m: see `modal_body.unit_loads`.
@@ -55,7 +55,7 @@ def unit_loads(model: SolidModel, interfaces: Mapping[str, Array]) -> Array:
 
 
 def static_shapes(flexibility: Flexibility, loads: Array) -> Array:
-    """Return displacements (3 owned, l), m, by `loads` (3 owned, l), N, under the reference condition; collective."""
+    """Displacements (3 owned, l), m, by `loads` (3 owned, l), N, under the reference condition; collective."""
     displacements = flexibility @ loads
     # Bending stresses cancel over a section: the round-off errors of an assembled K, small as they are, would show.
     return displacements + flexibility @ (loads - internal_forces(flexibility.model, displacements))

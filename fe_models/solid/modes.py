@@ -125,7 +125,7 @@ def section_motion(
     """Motion (rows, n) of the sections, m·√kg, for each of `FAMILIES`: sums of squares are shares of kinetic energy.
 
     Sections at x (k,), m, stations of `element` (e, 4), move by `translation` (k, 3, n), m, and `rotation`, rad;
-    `attached`: of each mass on an interface the motion there (6, n), and its weights (6,), kg and kg·m².
+    `attached`: of each mass on an interface the motion there (6, n), m and rad, and its weights (6,), kg and kg·m².
     """
     line = np.zeros(x.size)
     np.add.at(line, element, (x[element[:, 3]] - x[element[:, 0]])[:, None] * SIMPSON)
@@ -139,7 +139,7 @@ def section_motion(
 
 
 def names(motion: Sequence[Array]) -> list[str]:
-    """Return the family of each of n modes; "local" where sections have less than half of its motion.
+    """The family of each of n modes; "local" where sections have less than half of its motion.
 
     `motion`: of each of `FAMILIES`, m·√kg, (rows, n) by `section_motion`, whose squares are shares of kinetic energy.
     """
@@ -149,7 +149,7 @@ def names(motion: Sequence[Array]) -> list[str]:
 
 
 def aligned(omega2: Array, motion: Sequence[Array], wanted: Sequence[str] | str) -> Array:
-    """Return rotations Q (n, n), no unit, of modes of equal frequency to the families: a reproducible basis.
+    """Rotations Q (n, n), no unit, of modes of equal frequency to the families: a reproducible basis.
 
     `omega2` (n,) in rad²/s² is ascending, `motion` (rows, n), m·√kg, that of the sections by family. For `wanted`
     families (not "all") modes of nearly equal frequency are combined, too: all motion in a family is then in one.
@@ -183,7 +183,7 @@ def attachment_modes(
     length: float,
     twists_along: bool,
 ) -> ModeSet:
-    """Return attachment modes of the loads at so many `interfaces` that belong to `families`; collective.
+    """Attachment modes of the loads at so many `interfaces` that belong to `families`; collective.
 
     `loads` (3 owned, l), N, and `shapes`, m, are those of `invariants.unit_loads` and `static_shapes`, `modes` the
     eigenmodes. Moments are unit forces times `length` (m); `twists_along` adds a torque distributed along the link.

@@ -35,7 +35,7 @@ NEWTON_STEPS = 10
 
 
 def modal_strains(space: FunctionSpace, cells: Integers, X: Array, modes: Array) -> Array:
-    """Return strains (q, 6, n) ε_xx, ε_yy, ε_zz, 2ε_yz, 2ε_xz, 2ε_xy of modes, per unit of each, at points of cells.
+    """Strains (q, 6, n) ε_xx, ε_yy, ε_zz, 2ε_yz, 2ε_xz, 2ε_xy of modes, per unit of each, at points of cells.
 
     `cells` (q,) of this process, X (q, 3) reference coordinates in them, `modes` (3 (owned + ghosts), n), 1/√kg.
     """
@@ -59,7 +59,7 @@ def _symmetric(gradient: Array) -> Array:
 
 
 def jacobians(mesh: Mesh, cells: Integers, X: Array) -> Array:
-    """Return J (q, 3, 3) = ∂x/∂X, m, at reference coordinates X (q, 3), no unit, one point in each of `cells` (q,)."""
+    """J (q, 3, 3) = ∂x/∂X, m, at reference coordinates X (q, 3), no unit, one point in each of `cells` (q,)."""
     shapes = coordinate_element(mesh).tabulate(1, X)[1:, :, :, 0]
     corners = mesh.geometry.x[geometry_nodes(mesh)[cells]]
     return np.einsum("kqv,qvi->qik", shapes, corners)
@@ -91,7 +91,7 @@ def locate(mesh: Mesh, points: Array, slack: float) -> tuple[Integers, Integers,
 
 
 def pulled_back(mesh: Mesh, cells: Integers, points: Array) -> Array:
-    """Return reference coordinates (q, 3), no unit, of `points` (q, 3), m, in `cells` (q,); NaN far outside cells."""
+    """Reference coordinates (q, 3), no unit, of `points` (q, 3), m, in `cells` (q,); NaN far outside cells."""
     element = coordinate_element(mesh)
     corners = mesh.geometry.x[geometry_nodes(mesh)[cells]]
     X = np.full_like(points, 0.25)
@@ -156,7 +156,7 @@ def point_stresses(
 
 
 def surface_stresses(space: FunctionSpace, C: Array, modes: Array, points: Array) -> Array:
-    """Return modal stresses (p, 6, n), Pa/(m·√kg), at `points` (p, 3), m, of the picture mesh; equal on all processes.
+    """Modal stresses (p, 6, n), Pa/(m·√kg), at `points` (p, 3), m, of the picture mesh; equal on all processes.
 
     C and `modes` are as in `point_stresses`. Raises `ValueError` for a point that is not on the mesh.
     """
@@ -215,7 +215,7 @@ class Gradients:
     shapes: Array  # (3, q, d) slopes of the d shape functions on the reference cell, no unit
 
     def forces(self, stress: Array) -> Array:
-        """Return ∫ σ : ∇N_a dV (c, d, 3, k), N, at nodes of each cell, of stresses (c, 6, q, k) times weights, N·m."""
+        """∫ σ : ∇N_a dV (c, d, 3, k), N, at nodes of each cell, of stresses (c, 6, q, k) times weights, N·m."""
         c, _, q, k = stress.shape
         tensor = np.empty((c, 3, q, 3, k))
         for row, (i, j) in enumerate(VOIGT):
@@ -233,7 +233,7 @@ class Gradients:
         return _symmetric(self.values)
 
     def stresses(self, model: SolidModel) -> Array:
-        """Return σ = C ε (c, 6, q, k) times `weights`, N·m."""
+        """σ = C ε (c, 6, q, k) times `weights`, N·m."""
         strains = self.strains
         C = model.materials.C[model.materials.of_cell[self.cells]]
         stress = (C @ strains.reshape(*strains.shape[:2], -1)).reshape(strains.shape)
@@ -273,7 +273,7 @@ def _at_points(inverse: Array, gradient: Array) -> Array:
 
 
 def strain_energy(model: SolidModel, modes: Array) -> Array:
-    """Return K_ff (n, n) = ∫ ε(Φ_i) : C : ε(Φ_j) dV, J, of displacements Φ (3 owned, n), m; collective."""
+    """K_ff (n, n) = ∫ ε(Φ_i) : C : ε(Φ_j) dV, J, of displacements Φ (3 owned, n), m; collective."""
     n = modes.shape[1]
     total: Array = np.zeros((n, n))
     for piece in gradients(model, modes):
@@ -283,7 +283,7 @@ def strain_energy(model: SolidModel, modes: Array) -> Array:
 
 
 def internal_forces(model: SolidModel, fields: Array) -> Array:
-    """Return K u (3 owned, k), N, for displacements u = `fields` (3 owned, k), m, by their strains; collective."""
+    """K u (3 owned, k), N, for displacements u = `fields` (3 owned, k), m, by their strains; collective."""
     k, nodes, index = fields.shape[1], node_map(model.V), model.V.dofmap.index_map
     total = np.zeros((index.size_local + index.num_ghosts, 3 * k))
     for piece in gradients(model, fields):
@@ -294,7 +294,7 @@ def internal_forces(model: SolidModel, fields: Array) -> Array:
 
 
 def geometric_stiffness(model: SolidModel, modes: Array, prestress: Array) -> Array:
-    """Return ∫ σ_ab ∂_aΦ_i · ∂_bΦ_j dV (l, n, n), J, for the stresses σ of each of l displacement fields; collective.
+    """∫ σ_ab ∂_aΦ_i · ∂_bΦ_j dV (l, n, n), J, for the stresses σ of each of l displacement fields; collective.
 
     Second variation of the work of a stress σ on the quadratic part of Green's strain (Bathe, Finite Element
     Procedures, §6.2.3): positive where tension stiffens. `modes` (3 owned, n), m, are Φ, `prestress` (3 owned, l) the

@@ -70,7 +70,7 @@ class Factors:
             used.destroy()
 
     def solve(self, loads: Array) -> Array:
-        """Return K⁻¹ f (own, k), m, for `loads` f (own, k), N; collective."""
+        """K⁻¹ f (own, k), m, for `loads` f (own, k), N; collective."""
         result = np.empty_like(loads)
         for part in in_parts(loads.shape[1], COLUMNS):
             f = np.asfortranarray(loads[:, part])
@@ -191,13 +191,13 @@ class Flexibility:
         self._factor.release()
 
     def reactions(self, loads: Array) -> Array:
-        """Return reactions (6, k), N and N·m, along rows of B under `loads` (3 owned, k), N; none of rigid faces."""
+        """Reactions (6, k), N and N·m, along rows of B under `loads` (3 owned, k), N; none of rigid faces."""
         if self.B is None:
             return np.empty((0, loads.shape[1]))
         return -self._BR_inverse.T @ self.model.total(self.R.T @ loads)
 
     def supported(self, loads: Array) -> Array:
-        """Return `loads` (3 owned, k), N, with the reactions of mean supports added."""
+        """`loads` (3 owned, k), N, with the reactions of mean supports added."""
         return loads if self.B is None else loads + self.B.T @ self.reactions(loads)
 
 

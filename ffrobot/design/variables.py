@@ -58,7 +58,7 @@ class DesignVariable:
 
     @property
     def top(self) -> float:
-        """The largest coordinate; the smallest is 0."""
+        """Largest coordinate u of the search: 1 of numbers, the last row's number of catalogs; the smallest is 0."""
         return len(self.rows) - 1.0 if self.rows else 1.0
 
     def values(self, u: float) -> tuple[Any, ...]:

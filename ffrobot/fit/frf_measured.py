@@ -30,7 +30,7 @@ LABELS = {0: ("m",), 1: ("m/s",), 2: ("m/s^2", "m/s2", "m/s²", "m/s**2")}  # of
 
 
 class Column(NamedTuple):
-    """An FRF as a file has it: `values` (F,) at `frequency` (F,), Hz; points and directions as "POINT/-x"."""
+    """An FRF of a file: `values` (F,), in its unit, at `frequency` (F,), Hz; points and directions as "POINT/-x"."""
 
     force: str
     response: str

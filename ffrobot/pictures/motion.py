@@ -39,7 +39,7 @@ class MovingBody:
 
     @property
     def axes(self) -> Array:
-        """Return A (T, 3, 3), columns the axes of the frame, in global axes."""
+        """A (T, 3, 3), whose columns are the unit axes of the frame, in global axes."""
         return of_quaternion(self.orientation)
 
     def turned(self, vectors: Array) -> Array:
@@ -127,7 +127,7 @@ def _moving_body(results: Results, analysis: str, name: str, frames: Indices) ->
 
 
 def section_axes(bodies: Sequence[MovingBody], side: str, outputs: int) -> Array:
-    """Return axes (T, 3, 3), columns, global axes, of the section at `side` "BODY.POINT"; else of the body's frame.
+    """Axes (T, 3, 3), unit columns, global axes, of the section at `side` "BODY.POINT"; else of the body's frame.
 
     On the ground they are the global axes; `outputs`: T.
     """

@@ -85,7 +85,7 @@ def deviations(context: ActuatedContext, source: Run) -> Deviations:
 
 
 def varied_robots(model: Model, asked: Robustness) -> Iterator[tuple[str, Model]]:
-    """Yield cause and robot with other stiffness or mass of links, or stiffness of gears; both signs have one cause."""
+    """Yield cause and robot with more or less stiffness or mass of links, or stiffness of gears; one cause for both."""
     scene, bodies = model.scene, _bodies(model)
     for what in ("stiffness", "mass"):
         for share, factor in _both_ways(asked.parameters):

@@ -151,7 +151,7 @@ def smooth_motion(
 
     Returns:
         The diagnosis: `verdict` in words, `before.faults`, `before.residual` (m, peak to peak), …; and motions along
-        the same path: `best.times` (T,) s, `best.command` (T, n) in the order of `robot.joints`, `best.residual`, ….
+        the same path: `best.times` (T,) s, `best.command` (T, n) rad or m by `robot.joints`, `best.residual`, ….
 
     Raises:
         InputError: the file has other joints, or is no motion.

@@ -209,7 +209,7 @@ def _reduce(results: Results, name: str, reduction: str) -> float:
 
 
 def is_vector(results: Results, name: str, values: Array) -> bool:
-    """Whether columns of the dataset `name`, `values` (T, columns), are components of one vector."""
+    """Whether columns of the dataset `name`, `values` (T, columns), any unit, are components of one vector."""
     known = meaning(name.partition("/")[2])
     dimension = 3 if results.scene.get("space") == "spatial" else 2
     return known is not None and known.columns in ("axis", "component of {}") and values.shape[1] == dimension

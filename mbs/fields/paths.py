@@ -77,7 +77,7 @@ class Piecewise:
 
 
 def shifted(coefficients: Array, s: Array | float) -> Array:
-    """Polynomials in x (…, order, n), any unit, highest power first, in powers of x − s, s (…) (Horner)."""
+    """Polynomials in x (…, order, n), highest power first, in powers of x − s, s (…), by Horner; any units."""
     moved, s = coefficients.copy(), np.asarray(s)[..., None]
     for last in range(moved.shape[-2], 1, -1):
         for k in range(1, last):

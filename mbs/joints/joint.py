@@ -388,7 +388,7 @@ class AxialJoint(MovingJoint):
     """Axis of motion in the axes of the first of `between` (ground: global), of any length."""
 
     def triads(self) -> tuple[Array, Array]:
-        """Triads (3, 3) of first and second side with z along the axis, columns, in axes of the sections."""
+        """Triads (3, 3) of first and second side with z along the axis, unit columns, in axes of the sections."""
         first = smallest_turn(np.array(self.axis))
         return first, self.orientation.T @ first
 

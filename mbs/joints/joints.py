@@ -133,7 +133,7 @@ class UniversalJoint(AxialJoint):
         return self
 
     def triads(self) -> tuple[Array, Array]:
-        """Triads (3, 3) of first and second side, columns: x along the first axis, y along the second."""
+        """Triads (3, 3) of first and second side, unit columns: x along the first axis, y along the second."""
         x, y = unit(np.array(self.axis)), unit(self.orientation @ self.second_axis)
         z = unit(np.cross(x, y))
         first = np.stack([x, np.cross(z, x), z], axis=1)

@@ -131,7 +131,7 @@ def translational_stiffness(compliance: Array) -> Stiffness | None:
 
 
 def joint_conditions(mechanism: LinearMechanism) -> dict[str, JointCondition]:
-    """Return the condition "locked" (joints), and with compliant gears "compliant" (motors locked), by name."""
+    """The condition "locked" (joints), and with compliant gears "compliant" (motors locked), by name."""
     has_gears = any(name.startswith("motor/") for name in mechanism.outputs)
     largest, conditions = np.sqrt(np.diag(np.linalg.inv(mechanism.M))), {}
     for condition in (LOCKED, COMPLIANT)[: 1 + has_gears]:

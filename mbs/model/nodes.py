@@ -15,7 +15,7 @@ from .body import Body
 
 
 class Section(NamedTuple):
-    """A triad (3, 3) of columns on section `point` of body no. `body`, or at `position` (3,), m, on the ground (−1).
+    """A triad (3, 3), unit columns, on `point` of body no. `body`, or at `position` (3,), m, on the ground (−1).
 
     `still`: about its z it turns with the frame of the body, not with the section.
     """

@@ -233,7 +233,7 @@ def driven_mechanism(model: Model, *, has_motors: bool = True) -> _core.SpatialD
 
 
 def fastest_mechanism(model: Model, *, has_motors: bool = True) -> _core.PlanarDriven | _core.SpatialDriven:
-    """The core's mechanism, planar for open chains that move in a plane, where both have the same equations."""
+    """The core's mechanism with the model's equations, planar for open chains that move in a plane, else spatial."""
     system = driven_system(model)
     if model.loop_rows.any() or system.plane is None:
         return driven_mechanism(model, has_motors=has_motors)

@@ -209,7 +209,7 @@ class CutCoordinate(NamedTuple):
 
 
 def with_auxiliary_rotors(tree: KinematicTree) -> tuple[KinematicTree, list[ConstraintRow]]:
-    """The tree with rotors' outputs on first sides of cut joints, and equations to follow these joints."""
+    """The tree with massless outputs of rotors on first sides of cut joints; equations: these move as the joints do."""
     cut = [joint for joint in tree.loops if getattr(joint, "rotor_inertia", 0.0)]
     rows = [cut_row(tree, joint) for joint in cut]
     longer = tree.with_outputs([(joint, f"{joint.name}/rotor", row.a) for joint, row in zip(cut, rows, strict=True)])

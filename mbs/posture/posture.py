@@ -33,7 +33,7 @@ class Mobility:
 
 
 def mobilities(model: Model, q: Array, times: Array, loop_rank: int = -1) -> list[_core.Mobility]:
-    """Return the mobility with rigid links and gears at q (T, n_q), rad and m, and `times` (T,), s.
+    """The mobility with rigid links and gears at q (T, n_q), rad and m, and `times` (T,), s.
 
     `loop_rank` is the rank of the loops' equations with straight links; where negative, that at q. Bent links raise
     it, so that redundant equations seem to lock joints.
@@ -285,7 +285,7 @@ def _jump(function: TimeFunction, end: float, order: int) -> tuple[float, float,
 
 
 def misfits(function: TimeFunction, times: Array, order: int) -> Array:
-    """Return how far changes of derivative `order` between `times` (T, …), s, differ from integrals of the next one.
+    """How far changes of derivative `order` between `times` (T, …), s, differ from integrals of the next one.
 
     (T − 1, …) in the unit of that derivative, by the trapezoidal rule; 0 where not finite.
     """

@@ -168,7 +168,7 @@ def _with_slides(model: Model, q: Array) -> Array:
 
 
 def relaxed_gears(model: Model, state: State) -> State:
-    """Return `state` with compliant gears untwisted: twist and its rate 0.
+    """`state` with compliant gears untwisted: twist and its rate 0.
 
     Motors move to their joints; where a trajectory prescribes the motor, its joint moves to it.
     """

@@ -45,7 +45,7 @@ class BodyMotion(NamedTuple):
 
 
 def continuous(e: Array) -> Array:
-    """Quaternions e (T, 4) with signs that do not jump, the first e0 ≥ 0."""
+    """Quaternions e (T, 4), no unit, with signs that do not jump, the first e0 ≥ 0."""
     flips = np.sum(e[1:] * e[:-1], axis=1) < 0
     return e * np.where(np.cumsum(np.append(False, flips)) % 2, -1.0, 1.0)[:, None]
 

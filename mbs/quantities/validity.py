@@ -125,7 +125,7 @@ class Missing(NamedTuple):
 def missing_to_first_order(link: ModalBody, T: Array, p: Array, loads: ModalLoads, *, is_at_rest: bool) -> Missing:
     """The errors of a link without geometric stiffening; infinite if loads at rest buckle it.
 
-    p (T, n), √kg·m, are modal coordinates of the equations, T p those of the file.
+    p (outputs, n), √kg·m, are modal coordinates of the equations; T (n_file, n), no unit, times them those of the file.
     """
     if not len(p) or not loads.f.size:
         return Missing(0.0, 0.0)

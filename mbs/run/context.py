@@ -44,7 +44,7 @@ class PatchedLink(Protocol):
         """Matrices (m, n), no unit, by body, from forces on n modes of the file to those on m that patches reach."""
 
     def allocation(self, *, limited: bool) -> _core.Allocation:
-        """Return the map from m modal forces to k voltages, with limits of the patches or without."""
+        """The map from m modal forces to k voltages, with limits of the patches or without."""
 
 
 def strain_directions(model: Model, patches: Mapping[str, PatchedLink]) -> Array:
@@ -54,7 +54,7 @@ def strain_directions(model: Model, patches: Mapping[str, PatchedLink]) -> Array
 
 
 def amplifiers_on(model: Model, patches: Mapping[str, PatchedLink]) -> Amplifiers:
-    """Return the amplifiers of all patches, their capacitances where modes of the model stand still."""
+    """The amplifiers of all patches, their capacitances where modes of the model stand still."""
     of, Phi_V = joined(of.amplifiers for of in patches.values()), strain_directions(model, patches)
     return replace(of, capacitance=of.capacitance - model.compliance(Phi_V, Phi_V))
 
@@ -63,7 +63,7 @@ class PointsOfBody(Protocol):
     """Points of one body for c components of force along its axes."""
 
     def of_core(self) -> tuple[Array, Array, Array, Array]:
-        """Return directions (3, c), positions (3, c), m, mode shapes (3 c, n), 1/√kg, factors to N (6 + n,)."""
+        """Directions (3, c), positions (3, c), m, mode shapes (3 c, n), 1/√kg, factors to N (6 + n,)."""
 
 
 ForcesAtPoints = Callable[[Run], Mapping[str, Array]]
@@ -100,5 +100,5 @@ class Context:
 
 
 def place_of(whole: WholeLinks | None, point: Point) -> Point:
-    """Return the model's "BODY.POINT" for that of the scene; they differ on links in pieces."""
+    """The model's "BODY.POINT" for that of the scene; they differ on links in pieces."""
     return point if whole is None or point is None else whole.places.get(point, point)

@@ -259,7 +259,7 @@ class _Integration:
         )
 
     def posture(self, run: _core.TreeRun, motion: Run) -> str:
-        """Return a remark on the posture nearest to a singular one; "" if all are far from it."""
+        """A remark on the posture nearest to a singular one; "" if all are far from it."""
         model, size, loop_rank = motion.model, len(motion.time), self.loop_rank
         if loop_rank is None or not size:
             is_end = _ends_in_posture(run)
@@ -271,7 +271,7 @@ class _Integration:
         return posture or describe_branches(model, some.time, some.q, loop_rank)
 
     def replayed(self, run: _core.TreeRun, motion: Run, known: int) -> Array:
-        """Return what a replay applies (T, numbers) at the times of `motion`; `run` lacks the `known` first ones."""
+        """Numbers that a replay applies (T, numbers) at the times of `motion`; `run` lacks the `known` first ones."""
         if self.drives.replayed is None:
             return np.zeros((len(motion.time), 0))
         before, after = self.drives.replayed.source.sample(motion.time[:known].tolist()), run.replayed[known:]

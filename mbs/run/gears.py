@@ -30,7 +30,7 @@ CONTRACTS = 0.5  # of one change the next one at most, where rotors on outer bod
 
 
 def supplied_in(run: Run) -> Array:
-    """Return generalized forces (T, n_v), N·m, N and, on modes, N/√kg, that paths or a prescribed shape require."""
+    """Generalized forces (T, n_v), N·m, N and, on modes, N/√kg, that paths or a prescribed shape require."""
     if run.required is not None:
         return run.required
     return path_forces(run.model, run.time, run.q, run.multipliers)
@@ -44,7 +44,7 @@ class Supplied(NamedTuple):
 
 
 def supplied_through_gears(run: Run) -> Supplied:
-    """Return motor and modal forces of a run, with the motion of its compliant gears.
+    """Motor and modal forces of a run, with the motion of its compliant gears.
 
     Twists δ add moments on rotors and on the bodies that carry them (docs/theory.md, (26), (27)), which motors and
     modes supply. Moments in front of a gear contain those of other gears: all are found anew until they repeat. Twists
@@ -112,7 +112,7 @@ class MotorCoordinates(NamedTuple):
 
 
 def with_motor_coordinates(run: Run, model: Model) -> MotorCoordinates:
-    """Return the motion of `run` in coordinates of `model`, its motors advanced by the twist of compliant gears.
+    """The motion of `run` in coordinates of `model`, its motors advanced by the twist of compliant gears.
 
     Raises `InputError` where motors turn frames and modes tilt the joint's axis: no angle belongs to their moments.
     """
@@ -130,7 +130,7 @@ def with_motor_coordinates(run: Run, model: Model) -> MotorCoordinates:
 
 
 def with_motors(model: Model, rigid: States, gears: Mapping[str, GearMotion]) -> KnownStates:
-    """Return states of `model`, which has compliant gears, from `rigid` ones and the twists of `gears`, by joint.
+    """States of `model`, which has compliant gears, from `rigid` ones and the twists of `gears`, by joint.
 
     Motors of joints not in `gears` are untwisted.
     """
@@ -158,7 +158,7 @@ class GearSpring(NamedTuple):
 def gear_motion(
     spring: GearSpring, time: Array, tau: Array, rotor: Array, gamma: Array, curve: GearCurve | None = None
 ) -> GearMotion:
-    """Return the motion of a gear from the motor torque `tau` (T,), N·m, with a rigid gear.
+    """The motion of a gear from the motor torque `tau` (T,), N·m, with a rigid gear.
 
     `rotor` (T,), N·m: the part of it that accelerates the rotor; `gamma` (T, 3): the joint's coordinate, rad, its rate
     and acceleration; `curve`: δ(t), τ(t), where they are known.

@@ -90,7 +90,7 @@ class Choice(NamedTuple):
         return f"{before}, then {last}" if before else last
 
     def changed_in(self, run: _core.TreeRun) -> "Choice":
-        """Return the choice with the changes of integrators during `run` in its name and reason."""
+        """The choice with the changes of integrators during `run` in its name and reason."""
         if not run.changes:
             return self
         names = {kind: name for name, kind in METHODS.items()}
@@ -173,7 +173,7 @@ def beyond_round_off(tolerance: float, run: _core.TreeRun, of_gears: float) -> s
 
 
 def unmet(choice: Choice, run: _core.TreeRun) -> str:
-    """Return a sentence on the last steps of a `run` in which they became too short, with advice."""
+    """A sentence on the last steps of a `run` in which they became too short, with advice."""
     if run.last_step == 0:
         return (
             "the first step would be too short to change the time: accelerations or frequencies are that large;"
@@ -206,7 +206,7 @@ TOO_STIFF = 1e6  # rates of friction in a run above which explicit steps, a few 
 
 
 def integrator_of(model: Model, name: str) -> str:
-    """Return the integrator `name` of a scene, or for "auto" one for the whole run.
+    """The integrator `name` of a scene, or for "auto" one for the whole run.
 
     That is Radau where dry friction acts on links with modes: near rest it is a damper so stiff for the light ends of
     links that explicit steps take nanoseconds; else DOP853.

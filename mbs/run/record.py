@@ -60,7 +60,7 @@ class Statistics:
     warnings: tuple[str, ...] = ()
 
     def added_to(self, earlier: "Statistics") -> "Statistics":
-        """Return statistics that include the earlier part of a resumed run."""
+        """Statistics that include the earlier part of a resumed run."""
         counts = ("steps", "rejected", "evaluations", "wall_seconds")
         whole = replace(self, **{name: getattr(earlier, name) + getattr(self, name) for name in counts})
         ends = np.concatenate([earlier.step_ends, self.step_ends])
@@ -174,7 +174,7 @@ class Run:
         return self if self.look_closer is None else self.look_closer()
 
     def with_look(self, at: "Callable[[Array], Run]") -> Self:
-        """Return the run with a `look_closer` by `at`, which makes a run at times (T,), s, that resolve its paths."""
+        """The run with a `look_closer` by `at`, which makes a run at times (T,), s, that resolve its paths."""
 
         @cache
         def look_closer() -> "Run":
@@ -217,7 +217,7 @@ class Run:
             )
 
     def at(self, rows: slice | Sequence[int] | Indices) -> Self:
-        """Return the run with the outputs of numbers `rows` alone."""
+        """The run with the outputs of numbers `rows` alone."""
         return self._each(lambda x: x[rows])
 
     def with_rows_of(self, other: "Run", order: Indices) -> Self:
@@ -225,7 +225,7 @@ class Run:
         return self._each(lambda x, y: np.concatenate([x, y])[order], other)
 
     def after(self, earlier: "Run") -> Self:
-        """Return the run with the earlier part of the same motion in front."""
+        """The run with the earlier part of the same motion in front."""
         return self._each(lambda x, y: np.concatenate([y, x[len(y) :]]), earlier)
 
     def _each(self, change: Callable[..., Array], *others: "Run") -> Self:

@@ -98,7 +98,7 @@ class OfPaths(NamedTuple):
 
 
 def path_numbers(run: Run) -> OfPaths:
-    """Return the constraint forces of the paths of `run` over time: along joint coordinates, and on points."""
+    """The constraint forces of the paths of `run` over time: along joint coordinates, and on points."""
     model = run.model
     rows = [(k, row) for k, row in enumerate(model.rows) if row.is_trajectory]
     along = [(k, row) for k, row in rows if row.kind == "coordinate"]

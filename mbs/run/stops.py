@@ -46,7 +46,7 @@ ENDS = _Ends()
 def stops(
     times: Array, paths: Iterable[Trajectory], loads: Iterable[TimeFunction], *, is_driven: bool, is_replay: bool
 ) -> Array:
-    """Return times (n,), s, at which integration steps must end in a run with outputs at `times` (T,), s.
+    """Times (n,), s, at which integration steps must end in a run with outputs at `times` (T,), s.
 
     Steps end where a condition such as t < 0.1 changes in paths and loads, and in brief pieces in which a path moves
     far or conditions change.
@@ -152,7 +152,7 @@ def _parts(breaks: Array, chosen: Booleans) -> Array:
 
 
 def path_times(times: Array, paths: Iterable[Trajectory], end: float, others: Iterable[TimeFunction] = ()) -> Array:
-    """Return times (n,), s: outputs `times` (T,), and times between that resolve `paths` from 0 to `end` (s).
+    """Times (n,), s: outputs `times` (T,), and times between that resolve `paths` from 0 to `end` (s).
 
     `others`: loads and other prescribed functions, which are resolved, too.
     """

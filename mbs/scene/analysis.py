@@ -36,7 +36,7 @@ class Surroundings(NamedTuple):
     kinds: Callable[[], Sequence[type["Analysis"]]]
 
     def replayable(self, way: str | None = None) -> str:
-        """Return kinds that forward runs can replay with `apply` = `way` (None: any), as text: `"pcid" or "fcid"`."""
+        """Kinds that forward runs can replay with `apply` = `way` (None: any), as text: `"pcid" or "fcid"`."""
         kinds = [kind for kind in self.kinds() if (way in kind.applicable if way else kind.applicable)]
         return either(kind.kind_name() for kind in kinds)
 
@@ -77,7 +77,7 @@ class Analysis(Referring):
 
     @classmethod
     def refuse_key(cls, key: str, others: Sequence[type[Record]]) -> str:
-        """Return the message for a `key` that only the kinds `others` have; empty without any."""
+        """The message for a `key` that only the kinds `others` have; empty without any."""
         if not others:
             return ""
         kinds = either(other.kind_name() for other in others if issubclass(other, Analysis))
@@ -85,7 +85,7 @@ class Analysis(Referring):
 
     @classmethod
     def demand_key(cls, key: str) -> str:
-        """Return the message for a missing key, with the kind."""
+        """The message for a missing key, with the kind."""
         return f'expected the key "{key}" in kind = "{cls.kind_name()}", found none'
 
     @property
@@ -109,7 +109,7 @@ class Analysis(Referring):
         return getattr(self, "check", None) is not None
 
     def run(self, context: Any) -> Any:
-        """Return the `Run` of the analysis in a `Context`: the scene's model, earlier runs and what watches."""
+        """The `Run` of the analysis in a `Context`: the scene's model, earlier runs and what watches."""
         raise NotImplementedError
 
     def needs(self) -> Iterator[Need]:
@@ -272,7 +272,7 @@ class ActuatedAnalysis(IntegratedAnalysis):
 
 
 def output_times(end: float, step: float, before: float = 0.0, after: float = 0.0) -> Array:
-    """Return output times (T,), s: multiples of `step` from −`before` to `end` + `after`; `end` exactly."""
+    """Output times (T,), s: multiples of `step` from −`before` to `end` + `after`; `end` exactly."""
     if not (end and step):
         return np.zeros(1)
     early, late, count = (round(x / step) for x in (before, after, end))

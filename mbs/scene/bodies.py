@@ -29,13 +29,13 @@ ROUND_OFF = 1e-9  # of the largest entry of an inertia tensor
 
 
 def tensor(inertia: Inertia) -> Array:
-    """Return the inertia tensor (3, 3), kg·m², from [xx, yy, zz] or all nine entries."""
+    """The inertia tensor (3, 3), kg·m², from [xx, yy, zz] or all nine entries."""
     array = np.array(inertia, dtype=float)
     return np.diag(array) if array.ndim == 1 else array
 
 
 def check_inertia(inertia: Inertia) -> Inertia:
-    """Return `inertia`, kg·m². Raises `ValueError` if unsymmetric, or a principal moment exceeds the sum of the others.
+    """`inertia`, kg·m². Raises `ValueError` if unsymmetric, or a principal moment exceeds the sum of the others.
 
     Moments may be zero: those of a point mass, and of a rod about its axis.
     """

@@ -67,11 +67,11 @@ class Initial(Referring):
     _named: dict[str, frozenset[str]] = PrivateAttr(default_factory=dict)
 
     def named(self, table: Literal["joints", "joint_rates"]) -> frozenset[str]:
-        """Return names of joints with values in the file: their own, or those of both bodies that they connect."""
+        """Names of joints with values in the file: their own, or those of both bodies that they connect."""
         return self._named.get(table, frozenset(getattr(self, table)))
 
     def naming(self, **named: frozenset[str]) -> Self:
-        """Return a copy that counts only joints `named`, by table, as given in the file, though others have values."""
+        """A copy that counts only joints `named`, by table, as given in the file, though others have values."""
         copy = self.model_copy()
         copy._named = named
         return copy
@@ -196,7 +196,7 @@ Values = Mapping[str, float]
 
 
 def in_3d(scene: S) -> S:
-    """Return a planar scene with initial guesses of joints in place of those of bodies; spatial scenes unchanged.
+    """A planar scene with initial guesses of joints in place of those of bodies; spatial scenes unchanged.
 
     The guess of a revolute joint is the angle of its second body on the first, in rad; welds and prismatic joints keep
     that angle. Likewise for rates. A body that no joint carries has guesses of a planar joint of its name.

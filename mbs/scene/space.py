@@ -23,11 +23,11 @@ class Space:
         return len(self.rotations) == 1
 
     def along(self, vectors: Array) -> Array:
-        """Return components (…, d) along the space's axes of positions, velocities or forces (…, 3), any unit."""
+        """Components (…, d) along the space's axes of positions, velocities or forces (…, 3), any unit."""
         return vectors[..., list(self.translations)]
 
     def about(self, vectors: Array) -> Array:
-        """Return components about the space's axes of vectors (…, 3), rad/s or N·m: (…, 3), planar (…)."""
+        """Components about the space's axes of vectors (…, 3), rad/s or N·m: (…, 3), planar (…)."""
         return vectors[..., self.rotations[0]] if self.is_plane else vectors[..., list(self.rotations)]
 
 

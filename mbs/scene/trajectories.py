@@ -69,7 +69,7 @@ class Shaper(Record):
         return self
 
     def shape(self, motion: Piecewise) -> Piecewise:
-        """Return the motion shaped for each frequency; unchanged without `frequency`."""
+        """The motion shaped for each frequency; unchanged without `frequency`."""
         if self.kind == "none" or self.frequency is None:
             return motion
         for frequency, ratio in np.broadcast(self.frequency, self.damping_ratio or 0.0):
@@ -289,7 +289,7 @@ class Trajectory(Referring):
         return self._shaped(path_of(Legs(places, start, profile, smoothness, limits, durations, holds=holds, **more)))
 
     def changed(self, **keys: object) -> Self:
-        """Return the trajectory with some keys replaced."""
+        """The trajectory with some keys replaced."""
         return type(self)(**({key: getattr(self, key) for key in self.model_fields_set} | keys))
 
     @property

@@ -49,7 +49,7 @@ class Bounds:
 
 @struct
 class Posed:
-    """A tracking problem, its zero dynamics, `breaks` (N + 1,), s, and `coarse` ones for the least voltage.
+    """The tracking problem `asked`, zero dynamics, `breaks` (N + 1,), s, and `coarse` ones for the least voltage.
 
     `around`: pre- and post-actuation, s.
     """
@@ -184,7 +184,7 @@ def check_reach(posed: Posed, least: Tracked | None) -> None:
 
 
 def check_motors(posed: Posed) -> None:
-    """Raise `SolveError` where motors exceed their limits even with patches of `OUT_OF_REACH` times theirs.
+    """Raise `SolveError` where motors exceed their limits even where patches have `OUT_OF_REACH` times their limits.
 
     The least torque is sought only where torques along the path exceed the limits without patches.
     """

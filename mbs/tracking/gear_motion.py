@@ -93,7 +93,7 @@ def _without_jumps(asked: Transition, meshes: tuple[Array, Array], near: Tracked
 
 
 def behind_gears(asked: Transition, tracked: Tracked, step: float) -> Tracked:
-    """Return the motion `tracked`, a solution of the problem `asked`, with its compliant gears.
+    """The motion `tracked`, a solution of the problem `asked`, with its compliant gears.
 
     It is extended by multiples of `step` (s) until damped gears are at rest.
     """

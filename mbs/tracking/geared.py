@@ -38,9 +38,9 @@ class Gears:
 
 @struct
 class GearedServo(Servo):
-    """A robot on its path with k compliant gears: torques (N, motors + k), of motors with rigid gears, then of gears.
+    """A robot on its path with k compliant gears; torques (N, motors + k), N·m or N.
 
-    `without` (k,) are the same robot without the rotor of one gear each.
+    Torques are those of motors with rigid gears, then of gears. `without` (k,): the robot less one gear's rotor each.
     """
 
     _: KW_ONLY
@@ -88,7 +88,7 @@ class GearedServo(Servo):
         return super().quasi_static(times, p)[:, : -len(self.without)]
 
     def slowed(self, factor: float) -> Servo:
-        """Return the servo on the same path in `factor` times the time."""
+        """The servo on the same path in `factor` times the time."""
         slower = tuple(servo.slowed(factor) for servo in self.without)
         return replace(super().slowed(factor), without=slower)  # type: ignore[call-arg]
 

@@ -46,7 +46,7 @@ class Curves:
     width: int
 
     def curve(self, u: Array) -> PPoly:
-        """V(t), V, by `u` (N + 1, count (order + 1)) at breaks: the linear derivative, then V and the lower ones."""
+        """V(t) by `u` (N + 1, count (order + 1)), SI, at breaks: the linear derivative, then V and the lower ones."""
         linear, *lower = np.split(u, self.order + 1, axis=1)
         slope = np.diff(linear, axis=0) / (factorial(self.order + 1) * np.diff(self.breaks)[:, None])
         powers = [of[:-1] / factorial(k) for k, of in enumerate([*lower, linear])]
@@ -98,7 +98,7 @@ class Iterate:
     moved: float = np.inf
 
     def tracked(self, steps: "Steps") -> Tracked:
-        """Return the motion as piecewise polynomials, with effort and its decrease per unit of limits by `steps`."""
+        """The motion as piecewise polynomials, with effort and its decrease per unit of limits by `steps`."""
         assert self.found is not None
         breaks, steps.sigma = steps.breaks, self.share
         cost = steps.cost(self.found)
@@ -133,7 +133,7 @@ class Steps:
     tolerance, gap = TOLERANCE, GAP
     effort: tuple[Array, Array, float]  # H, g, and the constant that the program leaves out
     unique, damping = UNIQUE, 0.0  # shares of the effort, and of sizes of steps, in the objective
-    of_voltages: float | Array = 1.0  # (N,) times the share of the effort
+    of_voltages: float | Array = 1.0  # (N,), no unit, times the share of the effort
     rows: list[tuple[str, Array, Indices]]  # of inequalities: kind, limits (i,), SI, and whose they are (i,)
 
     def __init__(self, asked: Transition, breaks: Array, tau_qs: Array, size: float) -> None:
@@ -363,7 +363,7 @@ class Steps:
         return np.concatenate(rows, axis=1), np.concatenate(most, axis=1)
 
     def prices(self, found: Minimum) -> dict[str, Array]:
-        """Return the decrease of the objective per unit of each limit, by kind of limit: as in `Tracked.prices`.
+        """The decrease of the objective per unit of each limit, by kind of limit: as in `Tracked.prices`.
 
         `found`: the last program's minimum with its multipliers.
         """
@@ -375,6 +375,6 @@ class Steps:
         return prices
 
     def cost(self, found: Minimum) -> float:
-        """Return the effort J at the minimum `found`: mean squares of torques and voltages in shares; no unit."""
+        """The effort J at the minimum `found`: mean squares of torques and voltages in shares; no unit."""
         (H, g, constant), z = self.effort, self.program.z(found.x)
         return float((z * (0.5 * (H @ z[..., None])[..., 0] + g)).sum()) + constant

@@ -85,7 +85,7 @@ class Transition:
 
     @property
     def allowed(self) -> float:
-        """Largest path error, m."""
+        """Largest path error allowed, m."""
         return 0.0 if self.tolerance is None else self.tolerance.error
 
     @property
