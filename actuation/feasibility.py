@@ -76,7 +76,7 @@ class Unsupplied:
 
 
 def quasi_static_shift(run: Run, modal: Mapping[str, Array], points: Iterable[str]) -> dict[str, Array]:
-    """Return shifts (T, 3), m, global axes, of points by name if `modal` forces F (T, n), N/√kg, by body are missing.
+    """Shifts (T, 3), m, global axes, of points by name if `modal` forces F (T, n), N/√kg, by body are missing.
 
     With motors locked, to first order and quasi-static: δp = −K⁻¹ F.
     """
@@ -86,7 +86,7 @@ def quasi_static_shift(run: Run, modal: Mapping[str, Array], points: Iterable[st
 
 
 def freed_shift(run: Run, modal: Mapping[str, Array], point: str, rows: Indices) -> Array:
-    """Return the shift (len(rows), 3), m, of a point at outputs `rows` if motors keep their torques: the robot recoils.
+    """The shift (len(rows), 3), m, of a point at outputs `rows` if motors keep their torques: the robot recoils.
 
     `modal` forces (T, n), N/√kg, by body are missing; as they are inner forces, momentum does not change.
     """
@@ -230,7 +230,7 @@ def judge_patches(
     *,
     with_count: Callable[[int], float | None] | None,
 ) -> PatchFeasibility:
-    """Return the requirements on the patches of one layout.
+    """The requirements on the patches of one layout.
 
     At `time` (T,), s: `charge` (T, k), C, modal coordinates p (T, n), m·√kg, of the link, required forces F_p (T, m),
     N/√kg, on modes of the layout. `with_count(k)`, if any: largest voltage (V) of k such patches; None without room.
@@ -262,7 +262,7 @@ def judge_patches(
 
 
 def worst(values: Array, range: Array) -> tuple[Array, Array]:
-    """Return the absolute value (k,) in each column of `values` (T, k) with the largest share of its limit, and limits.
+    """The absolute value (k,) in each column of `values` (T, k) with the largest share of its limit, and limits.
 
     `range` (2, k) has the negative limits, then the positive ones; all in the unit of the values.
     """
@@ -309,7 +309,7 @@ class LinkInMotion:
 
 
 def links_in_motion(run: Run, bodies: Mapping[str, tuple[ModalBody, Body]]) -> dict[str, LinkInMotion]:
-    """Return the motion of each link by name; `bodies`: modal bodies and equations of these links."""
+    """The motion of each link by name; `bodies`: modal bodies and equations of these links."""
     forces = actuator_forces(run)
     assert forces is not None
     return {
@@ -325,7 +325,7 @@ def judge_actuators(
     voltages: "Mapping[str, Voltages]",
     others: Container[str],
 ) -> Feasibility:
-    """Return the requirements on motors by joint ("JOINT 2" of a second coordinate) and on patches by layout.
+    """The requirements on motors by joint ("JOINT 2" of a second coordinate) and on patches by layout.
 
     `patches` are by link, `voltages` by layout. Links among `others` need no modal forces of patches.
     """
@@ -366,7 +366,7 @@ def find_unmet(
     *,
     limited: bool,
 ) -> dict[str, Array]:
-    """Return unmet modal forces (T, n), N/√kg, by link, at voltages within limits (`limited`) or at required ones."""
+    """Unmet modal forces (T, n), N/√kg, by link, at voltages within limits (`limited`) or at required ones."""
     unmet = {}
     for name, link in links.items():
         unmet[name] = link.F_p
@@ -384,7 +384,7 @@ def find_unsupplied(
     voltages: "Mapping[str, Voltages]",
     others: Container[str],
 ) -> Unsupplied | None:
-    """Return the path error by modal forces that voltages cannot supply; None if these bend no link.
+    """The path error by modal forces that voltages cannot supply; None if these bend no link.
 
     `patches` are by link, `voltages` by layout; links among `others` do not count.
     """

@@ -75,7 +75,7 @@ class MotorFeasibility:
 
 
 def judge_motors(run: Run) -> dict[str, MotorFeasibility]:
-    """Return the requirements on every motor up to the end of the path, by joint or "JOINT k"."""
+    """The requirements on every motor up to the end of the path, by joint or "JOINT k"."""
     forces, verdicts, end = actuator_forces(run), {}, run.analysis.last_time
     assert forces is not None
     inertias = _load_inertias(run)
@@ -98,7 +98,7 @@ def judge_motors(run: Run) -> dict[str, MotorFeasibility]:
 
 
 def static_moments(run: Run, end: float) -> Mapping[str, Array]:
-    """Return motor torques (T, coordinates) by joint, N·m or N, in T ≤ 21 equilibria on a path from t = 0 to `end` (s).
+    """Motor torques (T, coordinates) by joint, N·m or N, in T ≤ 21 equilibria on a path from t = 0 to `end` (s).
 
     Empty where there is no equilibrium, or motors do not fit the path.
     """
@@ -136,7 +136,7 @@ def _load_inertias(run: Run) -> dict[str, tuple[float, ...]]:
 
 
 def judge_motion(time: Array, moment: Array, rate: Array, limits: MotorLimits, end: float) -> MotorFeasibility:
-    """Return the requirements of torques `moment` (T,), N·m or N, at rates (T,), rad/s or m/s, over `time` (T,), s.
+    """The requirements of torques `moment` (T,), N·m or N, at rates (T,), rad/s or m/s, over `time` (T,), s.
 
     Root mean square and share of the time beyond limits are those from 0 to `end` (s), without pre- and post-actuation.
     """
@@ -161,7 +161,7 @@ def judge_motion(time: Array, moment: Array, rate: Array, limits: MotorLimits, e
 
 
 def first_time(time: Array, beyond: Booleans) -> Array:
-    """Return the first time (k,), s, of `time` (T,) at which each column of `beyond` (T, k) is true; NaN if never."""
+    """The first time (k,), s, of `time` (T,) at which each column of `beyond` (T, k) is true; NaN if never."""
     return np.where(beyond.any(axis=0), time[beyond.argmax(axis=0)], np.nan)
 
 

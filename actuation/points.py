@@ -83,12 +83,12 @@ class PointSet:
         return np.eye(3)[:, [AXES.index(axis) for axis in self.axes]]
 
     def of_core(self) -> tuple[Array, Array, Array, Array]:
-        """Return directions (3, c), positions (3, c), m, shapes (3 c, n), 1/√kg, `scale` (6 + n,), SI, for the core."""
+        """Directions (3, c), positions (3, c), m, shapes (3 c, n), 1/√kg, `scale` (6 + n,), SI, for the core."""
         position = np.transpose([point.position for point in self.points])
         return self.direction, position, np.vstack([point.translation for point in self.points]), self.scale
 
     def L_a(self, p: Array) -> Array:
-        """Return generalized forces (T, 6 + n, c), N, N·m, N/√kg, of 1 N per force at p (T, n), m·√kg; body axes."""
+        """Generalized forces (T, 6 + n, c), N, N·m, N/√kg, of 1 N per force at p (T, n), m·√kg; body axes."""
         e, columns = self.direction, []
         for k, point in enumerate(self.points):
             u = point.position + p @ point.translation.T
@@ -98,12 +98,12 @@ class PointSet:
         return np.stack(columns, axis=2)
 
     def scaled(self, p: Array) -> Array:
-        """Return `L_a` (T, 6 + n, c) at p (T, n), m·√kg, times `scale`: forces in N."""
+        """`L_a` (T, 6 + n, c) at p (T, n), m·√kg, times `scale`: forces in N."""
         return self.scale[:, None] * self.L_a(p)
 
 
 def make_point_set(layout: ActuationPoints, body: ModalBody | None, spatial: Body, space: Space) -> PointSet:
-    """Return the components of force in `layout`, or, if it has none, independent ones that are well conditioned.
+    """The components of force in `layout`, or, if it has none, independent ones that are well conditioned.
 
     `body` is the modal body, None of a rigid body; `spatial` its equations. Raises `InputError` for places that the
     body does not have, for more components than coordinates, and for dependent components; in the plane also for a
@@ -144,7 +144,7 @@ def make_point_set(layout: ActuationPoints, body: ModalBody | None, spatial: Bod
 
 
 def with_points(spatial: Body, chosen: PointSet) -> Body:
-    """Return the body with the actuation points among its points."""
+    """The body with the actuation points among its points."""
     own = dict(zip(chosen.names, chosen.points, strict=True))
     return replace(spatial, points=MappingProxyType({**spatial.points, **own}))
 
@@ -223,7 +223,7 @@ def solve_points(chosen: PointSet, run: Run) -> PointForces:
 
 
 def forces_at_points(chosen: Mapping[str, PointSet], run: Run) -> dict[str, Array]:
-    """Return forces (T, 3), N, global axes, by "BODY.POINT" along the motion of a run.
+    """Forces (T, 3), N, global axes, by "BODY.POINT" along the motion of a run.
 
     Raises `InputError` where a body without points has driving forces.
     """
@@ -247,7 +247,7 @@ def forces_at_points(chosen: Mapping[str, PointSet], run: Run) -> dict[str, Arra
 
 
 def find_driving_forces(run: Run) -> dict[str, Array]:
-    """Return driving forces Q_a (T, 6 + n) by body: N, N·m on its frame, in its axes, and N/√kg on its n modes."""
+    """Driving forces Q_a (T, 6 + n) by body: N, N·m on its frame, in its axes, and N/√kg on its n modes."""
     model = run.model
     by_body = path_forces_on_bodies(model, run.time, run.q, run.multipliers)
     if run.required is not None:  # forces on the modes alone, for a prescribed shape

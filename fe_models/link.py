@@ -107,7 +107,7 @@ def make_link(
 
 
 def cached_modal_body(source: LinkSource, progress: Progress | None = None) -> LinkOutcome:
-    """Return the modal body of a link: from LINK.h5 if up to date, else the user's cache, else computed.
+    """The modal body of a link: from LINK.h5 if up to date, else the user's cache, else computed.
 
     Cache entries are named by content: hashes of its modes and of all of it, under `ffrobot/links` in the XDG cache
     folder. A damaged entry is computed again. Raises `InputError` for a wrong link file, `SolveError` where the modes

@@ -22,7 +22,7 @@ LinkSource = Path | LinkTable
 
 
 def link_path(source: LinkSource) -> Path:
-    """Return the path of a link for messages."""
+    """The path of a link for messages."""
     return source.path if isinstance(source, LinkTable) else source
 
 

@@ -193,7 +193,7 @@ def _control(
 
 
 def _true_values(task: LoopTask, states: Sequence[Array]) -> dict[str, Array]:
-    """What an observer estimates, in the `states` of the plant with its voltages, by name."""
+    """Return what an observer estimates, in the `states` of the plant with its voltages, by name."""
     n_q, n_v = task.plant.tree.n_q, task.plant.tree.n_v
     values = task.ideal.read(*np.split(np.array(states), [n_q, n_q + n_v, n_q + 2 * n_v], axis=1))
     return dict(zip([signal.name for signal in task.ideal.signals], values.T, strict=True))
@@ -234,7 +234,7 @@ def loop_models(task: LoopTask) -> tuple[LinearModel, ...]:
 def loops_about(
     setup: Setup, controllers: Sequence[Controller], readings: Array, models: Sequence[LinearModel]
 ) -> tuple[list[tuple[LinearModel, Feedback]], Mapping[float, Feedback]]:
-    """Return the linear `models`, each with the linear controllers at its time; and controllers by time (s).
+    """The linear `models`, each with the linear controllers at its time; and controllers by time (s).
 
     The latter are at the start, or at each time of an observer's schedule. Both are empty where a controller is not
     linear at the time of a model. `readings` (K, outputs), in units of sensors, show how far a run deviates.
@@ -353,7 +353,7 @@ def _place_of_tip(task: LoopTask) -> Callable[[Array], Array]:
 
 
 def position(model: Model, q: Array, point: str) -> Array:
-    """Return places (T, d), m, of a `point` at q (T, n_q), m and rad."""
+    """Places (T, d), m, of a `point` at q (T, n_q), m and rad."""
     return model.tree.places(q).at(model.tree.section(point)).r
 
 

@@ -163,7 +163,7 @@ class PythonControl:
             raise SolveError(f"{label}: expected it to return a function (k, y) → u", f"{self.act!r}")
 
     def __call__(self, k: int, y: Array) -> Array:
-        """Return the commands (inputs,) of the user's function at sample k."""
+        """The commands (inputs,) of the user's function at sample k."""
         try:
             u = np.asarray(self.act(k, y), dtype=float)
         except (Exception, SystemExit) as error:  # the user's code may raise anything
@@ -188,7 +188,7 @@ def _in_words(error: BaseException) -> str:
 
 
 def load_function(reference: str, folder: Path) -> Callable[[Setup], Callable[[int, Array], Array]]:
-    """Return the function of "FILE.py:FUNCTION" of a scene in `folder`.
+    """The function of "FILE.py:FUNCTION" of a scene in `folder`.
 
     It makes the controller u (inputs,) = f(k, y (outputs,)), SI units, from the setup. `python_files.imported_files`
     lists its imports from below `folder`. Raises `InputError` where the file fails or lacks the function.
@@ -232,7 +232,7 @@ MOST_STATES = 500  # with which the Riccati equation takes seconds, not minutes
 
 
 def gains(model: SampledModel, Q: Array, R: Array) -> Array:
-    """Return K (m, n) of u = −K x with least Σ xᵀQx + uᵀRu; Q (k, k) weights the first k states, others are delays.
+    """K (m, n) of u = −K x with least Σ xᵀQx + uᵀRu; Q (k, k) weights the first k states, others are delays.
 
     K is in units of u over x, Q and R (m, m), diagonal, in inverse squares of units of x and u. Raises `ValueError`
     where the Riccati equation has no stabilizing solution.
@@ -310,7 +310,7 @@ class LqrControl:
 
 
 def design_model(record: Lqr, setup: Setup, beside: Sequence[JointPid]) -> LinearModel:
-    """Return the linear model for the design: about the reference at `record.time`, with the lowest modes of links.
+    """The linear model for the design: about the reference at `record.time`, with the lowest modes of links.
 
     Springs and dampers replace the joint controllers `beside`, without sampling and delay.
     """

@@ -94,7 +94,7 @@ class Linear(InstantAnalysis):
             yield from under(f"sensor no. {k}", sensor.references())
 
     def run(self, context: ActuatedContext) -> Run:
-        """Return the operating points, with details `LinearModels`. Raises `SolveError` in singular postures."""
+        """The operating points, with details `LinearModels`. Raises `SolveError` in singular postures."""
         run, about = find_operating_points(context, self)
         free = about.model
         linearization = LinearEquations(free, about.q[0], places_of(context, self.points))
@@ -122,7 +122,7 @@ class Linear(InstantAnalysis):
 
 
 def with_voltages(model: Model, mechanism: LinearMechanism, patches: Mapping[str, LinkPatches]) -> LinearMechanism:
-    """Return the mechanism with inputs "pzt/LAYOUT/k" after its motors: generalized forces of 1 V."""
+    """The mechanism with inputs "pzt/LAYOUT/k" after its motors: generalized forces of 1 V."""
     found = {name: column for name, column in mechanism.inputs.items() if name.startswith("joint/")}
     for of_link in patches.values():
         along_s = model.modal_directions(of_link.per_volt) @ mechanism.transformation

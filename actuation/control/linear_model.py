@@ -58,7 +58,7 @@ class StateSpace:
         return numbers(names, self.output_names, "linear model: expected an output")
 
     def arrays(self) -> dict[str, Any]:
-        """Return arrays, names and `time` of the model, as files contain them."""
+        """Arrays, names and `time` of the model, as files contain them."""
         return {one.name: getattr(self, one.name) for one in fields(self)}
 
     def save(self, path: Path) -> None:
@@ -66,7 +66,7 @@ class StateSpace:
         save_arrays(self.arrays(), path)
 
     def to_control(self, inputs: Names | None = None, outputs: Names | None = None) -> "control.StateSpace":
-        """Return a state-space model of python-control (extra "control"), with ":" instead of "." in names.
+        """A state-space model of python-control (extra "control"), with ":" instead of "." in names.
 
         From `inputs` to `outputs` by name, in that order; None: all. A sampled model has `step` as dt. Raises
         `InputError` for unknown names.
@@ -153,7 +153,7 @@ class LinearModel(StateSpace):
         return -A_K, -A_D, inputs, outputs
 
     def frequency_response(self, omega: Array, inputs: Names, outputs: Names) -> ComplexArray:
-        """Return the frequency response G(iω) (F, outputs, inputs) at `omega` (F,), rad/s; SI units."""
+        """The frequency response G(iω) (F, outputs, inputs) at `omega` (F,), rad/s; SI units."""
         K, D, B, _ = self.second_order
         s, f = 1j * np.asarray(omega)[:, None, None], self.freedom
         columns, rows = self.inputs(inputs), self.outputs(outputs)
@@ -165,7 +165,7 @@ class LinearModel(StateSpace):
 def state_space(
     mechanism: LinearMechanism, readings: Mapping[str, Sequence[Any]] = MappingProxyType({})
 ) -> LinearModel:
-    """Return the state space of a linear mechanism with sensors.
+    """The state space of a linear mechanism with sensors.
 
     `readings`: derivatives of outputs by s, ṡ, s̈ (f,) and voltages of patches (k,), SI units, by name of the output.
     """
@@ -200,7 +200,7 @@ def state_space(
 
 
 def is_kept(name: str, modes: int) -> bool:
-    """Return false for names of modal coordinates beyond the lowest `modes` of a link, else true."""
+    """False for names of modal coordinates beyond the lowest `modes` of a link, else true."""
     kind, *rest = name.split("/")
     return kind != "modal" or int(rest[1]) <= modes
 
@@ -254,7 +254,7 @@ def _some(names: tuple[str, ...]) -> str:
 
 
 def numbers(names: Names, known: Sequence[str], expected: str) -> list[int]:
-    """Return indices of `names` among `known` ones. Raises `InputError` with the text `expected` for others."""
+    """Indices of `names` among `known` ones. Raises `InputError` with the text `expected` for others."""
     wanted = [names] if isinstance(names, str) else names
     for name in wanted:
         if name not in known:
@@ -264,14 +264,14 @@ def numbers(names: Names, known: Sequence[str], expected: str) -> list[int]:
 
 @kept
 def robot_modes(model: LinearModel) -> RobotModes:
-    """Return poles (1/s) and shapes of a model, about a frozen configuration."""
+    """Poles (1/s) and shapes of a model, about a frozen configuration."""
     K, D, _, _ = model.second_order
     return modes_of(K, D, model.of_unit_mass, model.transformation)
 
 
 @kept
 def locked_frequencies(model: LinearModel) -> Array:
-    """Return undamped frequencies (k,), Hz, the lowest first, with all motor shafts locked."""
+    """Undamped frequencies (k,), Hz, the lowest first, with all motor shafts locked."""
     K, _, B, _ = model.second_order
     N = free_directions(B[:, model.inputs(model.motors)].T)
     omega = np.sqrt(np.linalg.eigvalsh(N.T @ (K + K.T) @ N / 2).clip(min=0.0))

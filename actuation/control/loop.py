@@ -67,7 +67,7 @@ class Loop:
         return (self.commands[: self.taken] <= lowest) | (self.commands[: self.taken] >= highest)
 
     def __call__(self, k: int, _t: float, y: Array) -> Array:
-        """Return the commands (inputs,) at sample k for the true values y (outputs,) of readings."""
+        """The commands (inputs,) at sample k for the true values y (outputs,) of readings."""
         y = np.minimum(np.maximum(self._filter(y) + self._errors[k], -self._largest), self._largest)
         if self._coarse.size:
             y[self._coarse] = np.round(y[self._coarse] / self._resolution) * self._resolution
@@ -114,7 +114,7 @@ class AmplifiedLoop:
         self.first = np.append(self.first[:motors], self._played.at(self._now))
 
     def __call__(self, k: int, t: float, state: Array) -> Array:
-        """Return the commands (inputs,) in step k from t (s) on, for the `state` there."""
+        """The commands (inputs,) in step k from t (s) on, for the `state` there."""
         if k % self._parts == 0:
             self._at_sample(k // self._parts, t, state)
         loop, motors = self._loop, len(self.first) - len(self._now)
@@ -138,7 +138,7 @@ class AmplifiedLoop:
 
 
 def measure(run: LoopMotion, setup: Setup, loop: Loop, lowest: float, is_stable: bool | None) -> Metrics:
-    """Return the metrics of a run; `lowest`: frequency of the robot with joints controlled or locked, Hz, or NaN.
+    """The metrics of a run; `lowest`: frequency of the robot with joints controlled or locked, Hz, or NaN.
 
     `is_stable`: whether the sampled linear loop is stable; None if not known.
     """
@@ -204,7 +204,7 @@ def between(times: Array, known: Array, values: Array) -> Array:
 
 
 def held_commands(times: Array, samples: Array, delay: float, loop: Loop | AmplifiedLoop, after: float) -> Array:
-    """Return the commands (T, inputs), N·m, N or V, in effect `after` seconds past `times` (T,), s.
+    """The commands (T, inputs), N·m, N or V, in effect `after` seconds past `times` (T,), s.
 
     A command of `samples` (K,), s, acts `delay` (s) later.
     """
@@ -214,7 +214,7 @@ def held_commands(times: Array, samples: Array, delay: float, loop: Loop | Ampli
 
 
 def times_of_run(outputs: Array, place_at: Callable[[Array], Array], lowest: float) -> tuple[Array, list[int]]:
-    """Return times (T,), s, of a run: its outputs, and those at which vibration about `lowest` (Hz) is measured.
+    """Times (T,), s, of a run: its outputs, and those at which vibration about `lowest` (Hz) is measured.
 
     The second result has indices of the `outputs` among them. `place_at` returns where the tip should be, m.
     """
@@ -234,7 +234,7 @@ def loop_record(
     loops: Loops,
     lowest: float,
 ) -> LoopRecord:
-    """Return the record of a run under the controllers `acting`; margins are of the linear `loops`.
+    """The record of a run under the controllers `acting`; margins are of the linear `loops`.
 
     `lowest`: frequency, Hz, of the robot with joints controlled or locked; NaN if nothing vibrates.
     """

@@ -48,11 +48,11 @@ class Feedback:
     late: Array | None = None
 
     def times(self, factor: float) -> "Feedback":
-        """Return the law with all commands times a factor."""
+        """The law with all commands times a factor."""
         return replace(self, C=factor * self.C, D=factor * self.D)
 
     def behind(self, A: Array, B: Array, C: Array, D: Array) -> "Feedback":
-        """Return the law with discrete filters A (m, m), B (m, p), C (p, m), D (p, p), SI, of its readings."""
+        """The law with discrete filters A (m, m), B (m, p), C (p, m), D (p, p), SI, of its readings."""
         if not len(A):
             return self
         whole = np.block([[self.A, self.B @ C], [np.zeros((len(A), len(self.A))), A]])
@@ -80,7 +80,7 @@ class Margins:
 
 
 def joint_gains(model: LinearModel, records: Sequence[JointPid], T: float) -> Feedback:
-    """Return the law of joint PID controllers, which add up, at samples every T (s).
+    """The law of joint PID controllers, which add up, at samples every T (s).
 
     −u = P y + D ẏ + D' (y − y₋)/T + I Σ T y with states y₋, the readings before, and Σ T y; D is of measured rates.
     """
@@ -108,14 +108,14 @@ def joint_gains(model: LinearModel, records: Sequence[JointPid], T: float) -> Fe
 
 
 def spectral_radius(model: LinearModel, feedback: Feedback, T: float, delay: float) -> float:
-    """Return the largest |eigenvalue| of the sampled loop, with sample time T and `delay`, s."""
+    """The largest |eigenvalue| of the sampled loop, with sample time T and `delay`, s."""
     return float(np.abs(loop_eigenvalues(model, feedback, T, delay)).max())
 
 
 def lowest_frequency(
     models: Sequence[LinearModel], controllers: Sequence[ControllerRecord], T: float, delay: float
 ) -> float:
-    """Return the lowest frequency of the robot with controlled or locked joints, Hz; NaN if nothing vibrates.
+    """The lowest frequency of the robot with controlled or locked joints, Hz; NaN if nothing vibrates.
 
     It is the lowest with locked motors and, if PID controllers alone drive joints, of the sampled loop (sample time T,
     `delay` of commands, s) with damping ratios below `LIGHTLY`. With other controllers it is
@@ -147,7 +147,7 @@ def eigenvalue_count(loop: tuple[LinearModel, Feedback], T: float, delay: float)
 
 
 def loop_eigenvalues(model: LinearModel, feedback: Feedback, T: float, delay: float) -> ComplexArray:
-    """Return eigenvalues (n,), no unit, of the loop from sample to sample, T (s) apart; `delay` of commands, s."""
+    """Eigenvalues (n,), no unit, of the loop from sample to sample, T (s) apart; `delay` of commands, s."""
     late = None if feedback.late is None else tuple(map(tuple, feedback.late))
     plant, y = _plant(model, feedback.inputs, feedback.outputs, late, T, delay)
     F = np.block([[plant.A + plant.B @ feedback.D @ y, plant.B @ feedback.C], [feedback.B @ y, feedback.A]])
@@ -185,7 +185,7 @@ def _plant(
 
 
 def margins(loops: Loops, T: float, delay: float) -> Margins:
-    """Return the worst stability margins of a loop in several configurations, with sample time T and `delay`, s.
+    """The worst stability margins of a loop in several configurations, with sample time T and `delay`, s.
 
     Gains are tried down to a hundredth and up to 10⁴ times, delays up to 50 samples.
     """
@@ -234,7 +234,7 @@ class Suggestion:
     bandwidth: float
 
     def in_words(self) -> str:
-        """Return the gains as keys of a scene file."""
+        """The gains as keys of a scene file."""
         P, D = (
             ", ".join(f"{toml_key(name)} = {value:.2g}" for name, value in of.items())
             for of in (self.proportional, self.derivative)
@@ -243,7 +243,7 @@ class Suggestion:
 
 
 def joint_inertia(model: LinearModel) -> Array | None:
-    """Return the inertia (motors, motors), kg·m² or kg, with links and gears rigid, rotors included.
+    """The inertia (motors, motors), kg·m² or kg, with links and gears rigid, rotors included.
 
     None unless motors are coordinates.
     """
@@ -263,7 +263,7 @@ def suggested_gains(
     side: Literal["joint", "motor"] = "joint",
     most_times: int = 20,
 ) -> Suggestion | None:
-    """Return PD gains for all motors to start with, for sample time T and `delay`, s; None where none are found.
+    """PD gains for all motors to start with, for sample time T and `delay`, s; None where none are found.
 
     P = J ω² and D = 2 J ω, critical damping of the inertia J of each joint with rigid links and other joints locked,
     the largest of the `models`. ω is a third of the lowest frequency with locked motors (at most half: Craig,
@@ -291,7 +291,7 @@ def suggested_gains(
 
 
 def unhurried_gains(models: Sequence[LinearModel]) -> tuple[Suggestion, float] | None:
-    """Return gains for a third of the lowest frequency with locked motors, and the longest sample time (s) for them.
+    """Gains for a third of the lowest frequency with locked motors, and the longest sample time (s) for them.
 
     It is of a 1-2-5 series from 10 ms down to 10 µs, without delay; None if the robot does not bend, or no
     gains are found.
@@ -304,7 +304,7 @@ def unhurried_gains(models: Sequence[LinearModel]) -> tuple[Suggestion, float] |
 
 
 def light_roots(models: Sequence[LinearModel]) -> list[str]:
-    """Return joints where a torque first turns the root of a bending link, which has hardly any inertia, not the link.
+    """Joints where a torque first turns the root of a bending link, which has hardly any inertia, not the link.
 
     The inertia that a sudden torque accelerates is small there against that with rigid links.
     """

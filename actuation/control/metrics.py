@@ -96,20 +96,20 @@ def ringing(time: Array, place: Array, lowest: float) -> tuple[float, float]:
 
 
 def resting(place_at: Callable[[Array], Array], time: Array) -> tuple[Array, Array]:
-    """Return evenly spaced times (T,), s, over `time`, and the place (T, d), m, of the tip there, for `ringing`."""
+    """Evenly spaced times (T,), s, over `time`, and the place (T, d), m, of the tip there, for `ringing`."""
     even = np.linspace(time[0], time[-1], FINE + 1)
     return even, place_at(even)
 
 
 def watched(end: float, window: float, lowest: float) -> Array:
-    """Return times (2 `WATCHED` + 1,), s, in the `window` (s) before `end`, half of them in a period of `lowest` Hz."""
+    """Times (2 `WATCHED` + 1,), s, in the `window` (s) before `end`, half of them in a period of `lowest` Hz."""
     begin = end - (min(window, 1.0 / lowest) if lowest > 0.0 else window)
     before = np.linspace(end - window, begin, WATCHED, endpoint=False)
     return np.concatenate([before, np.linspace(begin, end, WATCHED + 1)])
 
 
 def vibration(time: Array, error: Array, window: float, lowest: float) -> float:
-    """Return the peak-to-peak vibration (m) of `error` (T, d), m, in the last period of `lowest` (Hz).
+    """The peak-to-peak vibration (m) of `error` (T, d), m, in the last period of `lowest` (Hz).
 
     Its slow part over the last `window` (s) of `time` (T,), s, is removed; `time` should have the times `watched`. The
     slow part is the mean of least-squares cubics, each with one vibration near `lowest` or none, weighted by a power of
@@ -150,7 +150,7 @@ def _interpolated(times: Array, known: Array, values: Array) -> Array:
 
 
 def slow_part(t: Array, values: Array, window: float) -> Array:
-    """Return the part of `values` (T, columns), of any unit, at even times t (T,), s, that is no vibration.
+    """The part of `values` (T, columns), of any unit, at even times t (T,), s, that is no vibration.
 
     Cubics over a `window` (s) (Savitzky and Golay 1964). By FFT: SciPy's filter takes a time that grows with T².
     """
@@ -167,7 +167,7 @@ def slow_part(t: Array, values: Array, window: float) -> Array:
 
 
 def settling(t: Array, distance: Array) -> float:
-    """Return the time (s) from which `distance` (T,), m, at t (T,), s, stays below 5 % of its maximum; NaN if never."""
+    """The time (s) from which `distance` (T,), m, at t (T,), s, stays below 5 % of its maximum; NaN if never."""
     largest_error = float(distance.max())
     return _last_crossing(t, distance, SETTLED * largest_error) if largest_error > 0.0 else 0.0
 
@@ -189,7 +189,7 @@ def _last_crossing(t: Array, values: Array, level: float) -> float:
 
 
 def last_change(values_at: Callable[[Array], Array], time: Array) -> float:
-    """Return the time (s) at which `values_at` (times (T,), s) reaches its value at the end of `time` (T,), s."""
+    """The time (s) at which `values_at` (times (T,), s) reaches its value at the end of `time` (T,), s."""
     even, values = resting(values_at, time)
     way = np.linalg.norm(values - values[-1], axis=1)
     changing = np.flatnonzero(way > AT_REST * way.max(initial=0.0))
@@ -199,7 +199,7 @@ def last_change(values_at: Callable[[Array], Array], time: Array) -> float:
 def verdict_of(
     run: LoopMotion, cut: Array, asked: tuple[Array, Array], lowest: float, is_stable: bool | None, *, is_seen: bool
 ) -> str:
-    """Return the verdict on linear loop and run; in the quiet time, from `run.quiet` on, nothing changes.
+    """The verdict on linear loop and run; in the quiet time, from `run.quiet` on, nothing changes.
 
     "diverges"; "oscillates at its limits": in the last quarter, in which commands are at limits, vibration does not
     decay, or a command goes from one limit to the other; "grows": vibration from quarter to quarter (of path and rest

@@ -66,13 +66,13 @@ class Observer:
         return float(np.abs(np.linalg.eigvals(self.error)).max(initial=0.0))
 
     def towards(self, other: "Observer", part: float) -> "Observer":
-        """Return the observer with all matrices interpolated: `part` 0 is this one, 1 the other."""
+        """The observer with all matrices interpolated: `part` 0 is this one, 1 the other."""
         names = [each.name for each in fields(self) if each.name != "estimates"]
         mixed = {name: (1 - part) * getattr(self, name) + part * getattr(other, name) for name in names}
         return replace(self, **mixed)
 
     def closed(self, inner: Feedback) -> Feedback:
-        """Return observer and controllers `inner` on readings and estimates as one law from readings to commands.
+        """Observer and controllers `inner` on readings and estimates as one law from readings to commands.
 
         Limits of commands are left out.
         """
@@ -94,7 +94,7 @@ def kalman(
     estimated: Sequence[str],
     sampling: tuple[Sequence[str], float, float],
 ) -> Observer:
-    """Return the steady-state Kalman filter of a model that has the signals `read` and `estimated` as outputs.
+    """The steady-state Kalman filter of a model that has the signals `read` and `estimated` as outputs.
 
     `sampling`: names of commands, sample time and delay (s). Raises `InputError` for sensors without noise, for noise
     that acts on no input of the model, and for motions that do not decay and that no sensor sees.
@@ -167,7 +167,7 @@ def _covariance(A: Array, C: Array, Q: Array, R: Array, states: Sequence[str]) -
 
 
 def hidden(A: Array, C: Array, names: Sequence[str]) -> list[str]:
-    """Return `names` of the n states of x(k+1) = A x in motions that do not decay and that readings C x do not show.
+    """`names` of the n states of x(k+1) = A x in motions that do not decay and that readings C x do not show.
 
     A is (n, n), C (p, n), in any units. By the Popov–Belevitch–Hautus test.
     """
@@ -186,7 +186,7 @@ def hidden(A: Array, C: Array, names: Sequence[str]) -> list[str]:
 
 
 def given(record: GainsObserver, setup: Setup) -> Observer:
-    """Return the observer with the scene's matrices. Raises `InputError` where they do not fit, or let errors grow."""
+    """The observer with the scene's matrices. Raises `InputError` where they do not fit, or let errors grow."""
     A, B, C, gain = (np.atleast_2d(np.array(of, dtype=float)) for of in record.matrices)
     n, m, p = len(A), len(record.inputs), len(record.outputs)
     for name, of, size in (("A", A, (n, n)), ("B", B, (n, m)), ("C", C, (p, n)), ("gain", gain, (n, p))):
@@ -225,7 +225,7 @@ class Schedule:
     observers: tuple[Observer, ...]
 
     def at(self, t: float) -> Observer:
-        """Return the observer at t (s), interpolated; outside the times, the nearest one."""
+        """The observer at t (s), interpolated; outside the times, the nearest one."""
         if len(self.times) == 1:
             return self.observers[0]
         k = int(np.clip(np.searchsorted(self.times, t) - 1, 0, len(self.times) - 2))
@@ -314,7 +314,7 @@ class Observed:
         return found
 
     def record(self, truth: Mapping[str, Array]) -> Estimates:
-        """Return the estimates at the samples taken, compared with the true values (taken,), SI units, by name."""
+        """The estimates at the samples taken, compared with the true values (taken,), SI units, by name."""
         p, tip = self._p, self.tip
         taken = len(next(iter(truth.values())))
         values, times = self.estimates[:taken], self.setup.times[:taken]
@@ -350,7 +350,7 @@ class Observed:
 
 
 def model_of_filter(record: FilterRecord, robot: ControlledRobot, row: int, signals: Sequence[Signal]) -> LinearModel:
-    """Return the linear model of a filter about output no. `row` of the robot's motion, with outputs `signals`.
+    """The linear model of a filter about output no. `row` of the robot's motion, with outputs `signals`.
 
     Its links have their lowest modes alone; forces that `record` names are inputs, too.
     """
@@ -365,7 +365,7 @@ def kalman_filters(
     sensors: Sequence[Sensor],
     more: Sequence[Sensor],
 ) -> tuple[Schedule, list[str]]:
-    """Return filters along the path that estimate readings of `more`, and warnings of modes that `sensors` cannot see.
+    """Filters along the path that estimate readings of `more`, and warnings of modes that `sensors` cannot see.
 
     Raises `InputError` where no filter exists: see `kalman`.
     """

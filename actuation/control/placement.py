@@ -82,7 +82,7 @@ class Placed(Details):
 
 
 def locked_modes(model: LinearModel, link: PatchableLink, count: int) -> tuple[Array, Array, Array]:
-    """Return the lowest `count` modes of the robot, motors locked, in which the link bends.
+    """The lowest `count` modes of the robot, motors locked, in which the link bends.
 
     Frequencies (modes,), Hz, shapes (modes, m), no unit, in the link's p, and its share (modes,) of strain energy.
     """

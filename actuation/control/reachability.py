@@ -26,13 +26,13 @@ class Reachability:
 
 
 def controllability(model: LinearModel, inputs: Names) -> Reachability:
-    """Return controllability by mode, by the Popov–Belevitch–Hautus test of second-order equations."""
+    """Controllability by mode, by the Popov–Belevitch–Hautus test of second-order equations."""
     _, _, B, _ = model.second_order
     return _reach(model, _scaled(B, model.input_names)[:, model.inputs(inputs)], left=True)
 
 
 def observability(model: LinearModel, outputs: Names) -> Reachability:
-    """Return observability by mode, by the Popov–Belevitch–Hautus test of second-order equations."""
+    """Observability by mode, by the Popov–Belevitch–Hautus test of second-order equations."""
     C = np.vstack([model.of_unit_mass.T @ part.T for part in np.split(model.C, 2, axis=1)])
     return _reach(model, _scaled(C, model.output_names)[:, model.outputs(outputs)], left=False)
 

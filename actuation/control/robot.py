@@ -33,7 +33,7 @@ from .signals import check_joint
 
 
 def rigid_freedom(model: Model) -> int:
-    """Return the number of DOF of the mechanism with rigid links in its initial posture, with those of gears."""
+    """The number of DOF of the mechanism with rigid links in its initial posture, with those of gears."""
     return mobility(model, undeformed_posture(model).q).freedom + len(model.tree.gears)
 
 
@@ -67,7 +67,7 @@ class RigidArm:
             self._q[own.q] = q[node.q]
 
     def mobility(self) -> Array:
-        """Return accelerations (motors,) of each motor per unit torque of its own, others free, at rest; SI units."""
+        """Accelerations (motors,) of each motor per unit torque of its own, others free, at rest; SI units."""
         angles = self._model.constraints.values(self._q[None], np.zeros(1))[0][0, self._motors]
         return np.diag(np.linalg.inv(self.terms(angles, np.zeros_like(angles))[0]))
 
@@ -90,7 +90,7 @@ class RigidArm:
         return self._q, self._model.constraints.values(q, now)[1][0]
 
     def terms(self, gamma: Array, gamma_dot: Array) -> tuple[Array, Array]:
-        """Return M (motors, motors) and h (motors,) of τ = M γ̈ + h, SI units, by γ and γ̇ (motors,)."""
+        """M (motors, motors) and h (motors,) of τ = M γ̈ + h, SI units, by γ and γ̇ (motors,)."""
         q, C_v = self.place(gamma)
         rates = np.zeros(len(C_v))
         rates[self._motors] = gamma_dot
@@ -107,7 +107,7 @@ class RigidArm:
         return np.column_stack([moments(unit) - h for unit in np.eye(len(C_v))[self._motors]]), h
 
     def moments(self, gamma: Array, gamma_dot: Array, gamma_ddot: Array) -> Array:
-        """Return τ (motors,), N·m or N, for angles, rates and accelerations (motors,) of motors; SI units."""
+        """τ (motors,), N·m or N, for angles, rates and accelerations (motors,) of motors; SI units."""
         M, h = self.terms(gamma, gamma_dot)
         return M @ gamma_ddot + h
 
@@ -157,7 +157,7 @@ class ControlledRobot:
         return tuple(name for joint in self.model.motors for name in self.coordinates(joint))
 
     def coordinates(self, joint: str) -> tuple[str, ...]:
-        """Return names of a joint's coordinates: its name, or "NAME 1", "NAME 2"."""
+        """Names of a joint's coordinates: its name, or "NAME 1", "NAME 2"."""
         check_joint(self.model, joint)
         return tuple(name.removeprefix("joint/") for name, _ in labelled(self.model, joint))
 
@@ -200,12 +200,12 @@ class ControlledRobot:
         return with_voltages(self.plant, found, self.of_links)
 
     def rigid(self) -> RigidArm:
-        """Return the robot with rigid links at the start. Raises `InputError` if motors do not fit the mechanism."""
+        """The robot with rigid links at the start. Raises `InputError` if motors do not fit the mechanism."""
         return RigidArm(self.model, self.source.q[0])
 
 
 def whole_robot(context: ActuatedContext, source: Run) -> ControlledRobot:
-    """Return the robot of an analysis about the motion `source`, with whole links in place of subdivided ones."""
+    """The robot of an analysis about the motion `source`, with whole links in place of subdivided ones."""
     if context.whole is None:
         return ControlledRobot(context.model.without_paths(), context.patches, source)
     return ControlledRobot(context.whole.model.without_paths(), context.patches, context.whole.as_links(source))
@@ -218,7 +218,7 @@ def input_names(robot: ControlledRobot) -> tuple[str, ...]:
 
 
 def estimate(volts: Array, count: int) -> Array:
-    """Return the matrix (≤ count, k), m·√kg/V, from readings of k patches to estimates of the lowest coordinates.
+    """The matrix (≤ count, k), m·√kg/V, from readings of k patches to estimates of the lowest coordinates.
 
     `volts` (k, m), V/(m·√kg): readings per unit of each coordinate.
     """
@@ -266,7 +266,7 @@ def estimated_sensors(robot: ControlledRobot, controllers: Sequence[Controller],
 
 
 def default_tip(model: Model) -> str:
-    """Return the tool point "BODY.POINT" of the scene, or the tip of the last link."""
+    """The tool point "BODY.POINT" of the scene, or the tip of the last link."""
     if (tool := model.scene.tool_point) is not None:
         return tool
     body = next(node.body for node in reversed(model.tree.nodes) if node.body.points)
@@ -298,14 +298,14 @@ class Setup:
         return any(name.startswith("estimate/") for name in self.outputs)
 
     def columns(self, *names: str) -> Indices:
-        """Return indices (names,) of readings in y, or of their estimates. Raises `InputError` for unknown ones."""
+        """Indices (names,) of readings in y, or of their estimates. Raises `InputError` for unknown ones."""
         of = [f"estimate/{name}" if self.has_estimates and name not in self.outputs else name for name in names]
         return np.array(numbers(of, self.outputs, "controller: expected readings"), dtype=int)
 
     def places(self, *names: str) -> Indices:
-        """Return indices (names,) of commands in u. Raises `InputError` for a joint without motor."""
+        """Indices (names,) of commands in u. Raises `InputError` for a joint without motor."""
         return np.array(numbers(names, self.inputs, "controller: expected commands"), dtype=int)
 
     def modal_columns(self, body: str, m: int, ending: str = "/rate") -> Indices:
-        """Return indices (m,) in y of the lowest m modal rates of a body, or of coordinates for an empty `ending`."""
+        """Indices (m,) in y of the lowest m modal rates of a body, or of coordinates for an empty `ending`."""
         return self.columns(*(f"modal/{body}/{k}{ending}" for k in range(1, m + 1)))

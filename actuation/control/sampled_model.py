@@ -22,7 +22,7 @@ class SampledModel:
 
 
 def sampled(A: Array, B: Array, T: float, delay: float | Array, *, with_last: bool = False) -> SampledModel:
-    """Return the exact discrete model of x' = A x + B u, A (n, n), B (n, m), for samples every T (s).
+    """The exact discrete model of x' = A x + B u, A (n, n), B (n, m), for samples every T (s).
 
     See Åström and Wittenmark, Computer-Controlled Systems, sec. 2.3. `delay` (s) is that of all inputs, or (m,) of
     each. `with_last`: the last command, which acts until the sample, is a state also without delay. SI units.
@@ -47,7 +47,7 @@ def sampled(A: Array, B: Array, T: float, delay: float | Array, *, with_last: bo
 
 
 def zero_order_hold(A: Array, B: Array, T: float) -> tuple[Array, Array]:
-    """Return e^{A T} (n, n) and ∫ e^{A s} ds B (n, m) over T (s) of A (n, n), B (n, m), in any units of states."""
+    """e^{A T} (n, n) and ∫ e^{A s} ds B (n, m) over T (s) of A (n, n), B (n, m), in any units of states."""
     n, m = B.shape
     size = np.ones((n, 1))
     if n:
@@ -59,7 +59,7 @@ def zero_order_hold(A: Array, B: Array, T: float) -> tuple[Array, Array]:
 
 
 def riccati(A: Array, B: Array, Q: Array, R: Array, within: float = 1.0) -> Array:
-    """Return X (n, n) = AᵀXA − AᵀXB (R + BᵀXB)⁻¹ BᵀXA + Q that stabilizes A − B K, K = (R + BᵀXB)⁻¹ BᵀXA.
+    """X (n, n) = AᵀXA − AᵀXB (R + BᵀXB)⁻¹ BᵀXA + Q that stabilizes A − B K, K = (R + BᵀXB)⁻¹ BᵀXA.
 
     A and Q are (n, n), B (n, m), R (m, m), in consistent units; for filters use Aᵀ and Cᵀ. Raises `ValueError` where
     no X has eigenvalues of A − B K `within` that radius.
@@ -79,7 +79,7 @@ def riccati(A: Array, B: Array, Q: Array, R: Array, within: float = 1.0) -> Arra
 
 
 def by_doubling(A: Array, B: Array, X: Array) -> Array | None:
-    """Return X (n, n) = AᵀXA − AᵀXB (1 + BᵀXB)⁻¹ BᵀXA + Q by doubling; A (n, n), B (n, m), argument `X` is Q (n, n).
+    """X (n, n) = AᵀXA − AᵀXB (1 + BᵀXB)⁻¹ BᵀXA + Q by doubling; A (n, n), B (n, m), argument `X` is Q (n, n).
 
     Step k makes 2ᵏ of the Riccati recursion (B. D. O. Anderson, Int. J. Control 28, 1978, 295–306), in any units. None
     where it does not converge, or 1 is below round-off of BᵀXB.

@@ -74,7 +74,7 @@ class Sensing:
         self._system = MultibodySystem(model, drives) if accelerated else None
 
     def read(self, q: Array, v: Array, a: Array, V: Array | None = None) -> Array:
-        """Return readings (T, signals), SI units, in states q (T, n_q), v and a (T, n_v), under voltages V (T, k)."""
+        """Readings (T, signals), SI units, in states q (T, n_q), v and a (T, n_v), under voltages V (T, k)."""
         found = np.zeros((len(q), len(self.signals)))
         values = q[:, self._where] @ self._along.T, v @ self._along.T
         found[:, self._linear] = np.where(self._order == ORDERS["value"], *values)
@@ -96,7 +96,7 @@ class Sensing:
         return found
 
     def rows(self, about: LinearMechanism) -> tuple[Array, Array, Array]:
-        """Return derivatives (signals, f) of readings by s, ṡ and s̈, SI units, for a linear mechanism of the same tree.
+        """Derivatives (signals, f) of readings by s, ṡ and s̈, SI units, for a linear mechanism of the same tree.
 
         Exact of coordinates; of points by differences, to 1e-11. In moving loops the second rate of ∂q/∂s is left out.
         """
@@ -127,7 +127,7 @@ def readings_at(model: Model, mechanism: LinearMechanism, read: Sequence[Signal]
 def make_signals(
     model: Model, context: ActuatedContext, sensors: Iterable[Sensor], whole: WholeLinks | None = None
 ) -> list[Signal]:
-    """Return the readings of sensors of the scene, in order; `whole`: links that the model has subdivided.
+    """The readings of sensors of the scene, in order; `whole`: links that the model has subdivided.
 
     Raises `InputError` for a joint without coordinates in the tree, and for strain where the link has no such point.
     """
@@ -179,7 +179,7 @@ def _of_sensor(model: Model, context: ActuatedContext, sensor: Sensor, whole: Wh
 
 
 def filters(read: Sequence[Signal], T: float) -> tuple[Array, Array, Array, Array]:
-    """Return discrete A (m, m), B (m, p), C (p, m), D (p, p) from true values to p readings, in the unit of each.
+    """Discrete A (m, m), B (m, p), C (p, m), D (p, p) from true values to p readings, in the unit of each.
 
     High-pass filters, exact for values that change linearly between samples every T (s), come before delays.
     """
@@ -214,7 +214,7 @@ class Filter:
         self._w: Array | None = None
 
     def __call__(self, y: Array) -> Array:
-        """Return readings (signals,) for their true values y (signals,) at the next sample."""
+        """Readings (signals,) for their true values y (signals,) at the next sample."""
         A, B, C, D = self._matrices
         if not len(A):
             return y

@@ -33,7 +33,7 @@ class Zeros:
         return not self.unstable.size
 
     def describe(self) -> str:
-        """Return number and slowest unstable zero as text."""
+        """Number and slowest unstable zero as text."""
         if self.minimum_phase:
             return "minimum phase"
         slowest = self.unstable[np.abs(self.unstable).argmin()]
@@ -42,7 +42,7 @@ class Zeros:
 
 
 def zeros(model: LinearModel, inputs: Names, outputs: Names) -> Zeros:
-    """Return the zeros from as many inputs as outputs, by name (transmission zeros where more than one).
+    """The zeros from as many inputs as outputs, by name (transmission zeros where more than one).
 
     A transfer that is 0, or singular everywhere, has none. Raises `InputError` unless both have the same number.
     """
@@ -73,7 +73,7 @@ def zeros(model: LinearModel, inputs: Names, outputs: Names) -> Zeros:
 
 
 def by_side(values: ComplexArray, side: Array) -> Indices:
-    """Return the order (k,) of `values` (k,), any unit, by `side` of the imaginary axis (±1, 0), size, imaginary part.
+    """The order (k,) of `values` (k,), any unit, by `side` of the imaginary axis (±1, 0), size, imaginary part.
 
     Sizes within `MARGIN` of each other count as one: those of conjugates, and of ± s, differ by round-off alone.
     """

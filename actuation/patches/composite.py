@@ -59,7 +59,7 @@ class GaussPoint(NamedTuple):
 
 
 def section_loads(placed: PlacedLayout, body: ModalBody, p: Array, voltages: Array) -> SectionLoads:
-    """Return moments, N·m, and axial forces, N, of patches that bend a link in the plane on its sections.
+    """Moments, N·m, and axial forces, N, of patches that bend a link in the plane on its sections.
 
     The motion is p (T, n), m·√kg, on the modes of the body's file, under voltages (T, k), V.
     """
@@ -88,7 +88,7 @@ class LayersOnLink(NamedTuple):
 
 
 def layers_on_link(placed: Sequence[PlacedLayout], body: ModalBody) -> LayersOnLink:
-    """Return the loads of the layers of all layouts on their link."""
+    """The loads of the layers of all layouts on their link."""
     sections = link_sections(body)
     intervals, covering = _intervals(placed)
     points = list(gauss_points(body, intervals))
@@ -122,7 +122,7 @@ def layers_on_link(placed: Sequence[PlacedLayout], body: ModalBody) -> LayersOnL
 
 
 def stiffness_ratios(placed: PlacedLayout, body: ModalBody) -> tuple[Array, Array]:
-    """Return the stiffness ratio ψ (k,) of link to patch, and the authority (k,), no unit; NaN for unknown rigidities.
+    """The stiffness ratio ψ (k,) of link to patch, and the authority (k,), no unit; NaN for unknown rigidities.
 
     ψ = E_b A_b / (E_p w N t_p), E_b t_b / (E_p t_p) at equal widths. The authority is the curvature (or twist) under a
     voltage, relative to c V/EI (c V/GJ), that of a link without the layers' stiffness.
@@ -160,7 +160,7 @@ def gauss_points(body: ModalBody, intervals: Array) -> Iterator[GaussPoint]:
 
 
 def place_of(layout: PztLayout, sections: LinkSections, station: int) -> tuple[float, float]:
-    """Return the link's extent along the normal of its patches (m), see `LinkSections.extent`, and β at a station.
+    """The link's extent along the normal of its patches (m), see `LinkSections.extent`, and β at a station.
 
     β, see `LinkSections.shear_lever`, is shear per twist and distance; 0 where the layers carry no shear.
     """
@@ -169,7 +169,7 @@ def place_of(layout: PztLayout, sections: LinkSections, station: int) -> tuple[f
 
 
 def felt_loads(layout: PztLayout, sections: LinkSections, station: int) -> tuple[Array, Array, Array]:
-    """Return stiffness C (4, 4) and loads per volt f (4,), SI, of the layers by strains that interact with patches.
+    """Stiffness C (4, 4) and loads per volt f (4,), SI, of the layers by strains that interact with patches.
 
     Other strains are eliminated, as link and layers carry no load along them; C and f are 0 there. The third result is
     f (4,) on a straight link.
@@ -239,7 +239,7 @@ class Effects(NamedTuple):
 
 
 def effects(placed: Sequence[PlacedLayout], body: ModalBody) -> list[Effects]:
-    """Return the effects of each layout of one link, coupled by their stiffness if it counts."""
+    """The effects of each layout of one link, coupled by their stiffness if it counts."""
     found = [_straight(one, body) for one in placed]
     layouts, share = _each(placed)
     opened = np.array([of.electrodes == "open" for of in layouts])
@@ -399,7 +399,7 @@ def patched_body(spatial: Body, body: ModalBody, placed: Sequence[PlacedLayout])
 
 
 def _with_charges(patched: Body, layers: LayersOnLink, placed: Sequence[PlacedLayout]) -> Body:
-    """Return the body with the effect of the charges of patches with open electrodes, or a resistor of R Ω each.
+    """The body with the effect of the charges of patches with open electrodes, or a resistor of R Ω each.
 
     With the charge q = C V + Φᵀp and V = −R q̇ a patch has the dynamic stiffness Φ iωR/(1 + iωRC) Φᵀ (Hagood and von
     Flotow, J. Sound Vib. 146, 1991), ΦΦᵀ/C where R is infinite. Its stiffness and damping are those at the frequency
@@ -426,7 +426,7 @@ def _with_charges(patched: Body, layers: LayersOnLink, placed: Sequence[PlacedLa
 
 
 def structure_effect_of(bare: Body, patched: Body) -> StructureEffect:
-    """Return mass, moment of inertia and frequencies of a link without and with patches."""
+    """Mass, moment of inertia and frequencies of a link without and with patches."""
     pair = (bare, patched)
     return StructureEffect(
         np.array([body.mass for body in pair]),

@@ -74,7 +74,7 @@ class LinkPatches:
         return self.per_volt[self.body]
 
     def voltages(self, F_p: Array) -> dict[str, Voltages]:
-        """Return voltages by layout for modal forces F_p (T, n), N/√kg; `unmet` is left by all layouts together."""
+        """Voltages by layout for modal forces F_p (T, n), N/√kg; `unmet` is left by all layouts together."""
         found = solve_voltages(self.reach, self.reach.modes.forces(F_p))
         return self._by_layout(found.required, found.within_limit, F_p)
 
@@ -97,7 +97,7 @@ class LinkPatches:
         return np.concatenate([array.edges for array in self.arrays.values()])
 
     def at_voltages(self, V: Array, F_p: Array) -> dict[str, Voltages]:
-        """Return given voltages V (T, k), V, by layout, with the part of forces F_p (T, n), N/√kg, that is unmet."""
+        """Given voltages V (T, k), V, by layout, with the part of forces F_p (T, n), N/√kg, that is unmet."""
         return self._by_layout(V, np.clip(V, *self.amplifiers.range), F_p)
 
     def _by_layout(self, required: Array, within: Array, F_p: Array) -> dict[str, Voltages]:
@@ -118,11 +118,11 @@ class LinkPatches:
         return {name: self.reach.modes.forces(of.to_link.T).T for name, of in self.bodies.items()}
 
     def on_link(self, modal: Mapping[str, Array]) -> Array:
-        """Return modal forces (T, n), N/√kg, on modes of the link's file by forces `modal` on its `bodies`."""
+        """Modal forces (T, n), N/√kg, on modes of the link's file by forces `modal` on its `bodies`."""
         return np.sum([modal[name] @ of.to_link.T for name, of in self.bodies.items() if name in modal], axis=0)
 
     def allocation(self, *, limited: bool) -> _core.Allocation:
-        """Return the map from forces (m,) on the modes of `reach`, N/√kg, to voltages (k,), V, limited or not."""
+        """The map from forces (m,) on the modes of `reach`, N/√kg, to voltages (k,), V, limited or not."""
         return allocation(self.reach, limited=limited)
 
     def placed_on(self, start: float, length: float) -> list[tuple[Indices, PlacedLayout]]:
@@ -139,13 +139,13 @@ class LinkPatches:
         return found
 
     def columns(self, layout: str) -> slice:
-        """Return the columns of one layout among the k patches."""
+        """The columns of one layout among the k patches."""
         ends = np.cumsum([len(array.edges) for array in self.arrays.values()])
         end = int(ends[list(self.arrays).index(layout)])
         return slice(end - len(self.arrays[layout].edges), end)
 
     def unmet(self, F_p: Array, voltages: Array) -> Array:
-        """Return the part (T, n) of modal forces F_p (T, n), N/√kg, that voltages (T, k), V, of all patches leave."""
+        """The part (T, n) of modal forces F_p (T, n), N/√kg, that voltages (T, k), V, of all patches leave."""
         left = F_p - voltages @ self.Phi_V.T
         return left if self.on_kept is None else left @ self.on_kept
 
@@ -156,7 +156,7 @@ def driven_patches(placed: Iterable[PlacedLayout | PatchArray]) -> Array:
 
 
 def placed_patches(layouts: Sequence[PztLayout], body: ModalBody) -> list[PlacedLayout]:
-    """Return layouts with positions of patches, and `strain`: by default "biaxial" on wide links and outlined faces.
+    """Layouts with positions of patches, and `strain`: by default "biaxial" on wide links and outlined faces.
 
     Raises `InputError` for patches that do not fit the link.
     """
@@ -227,7 +227,7 @@ def check_reach(of_link: LinkPatches) -> None:
 
 
 def on_pieces(whole: LinkPatches, link: ModalBody, pieces: Mapping[str, tuple[float, ModalBody]]) -> LinkPatches:
-    """Return the patches of a link on its pieces as well: a patch across a cut acts on both sides of it.
+    """The patches of a link on its pieces as well: a patch across a cut acts on both sides of it.
 
     `pieces` by name from the root to the tip: where each begins, m from the root, and its modal body. Raises
     `InputError` for electrodes that a cut divides, and for shunts, which act at the frequencies of the link's modes.
@@ -259,7 +259,7 @@ def on_pieces(whole: LinkPatches, link: ModalBody, pieces: Mapping[str, tuple[fl
 
 
 def with_count(layout: PztLayout, body: ModalBody, spatial: Body, count: int) -> LinkPatches | None:
-    """Return `count` patches of a layout alone, evenly spaced, with one limit; None if they do not fit the link."""
+    """`count` patches of a layout alone, evenly spaced, with one limit; None if they do not fit the link."""
     try:
         return link_patches([layout.with_one_limit(count=count, centers=None)], body, spatial)
     except InputError:  # no room, a step of the section, weights for another number
@@ -307,7 +307,7 @@ def _key(layout: PztLayout, *others: PztLayout) -> str:
 
 
 def on_kept_modes(of_link: LinkPatches, equations: Body) -> LinkPatches:
-    """Return the patches of a link for its `equations`, which may have fewer modes than its file.
+    """The patches of a link for its `equations`, which may have fewer modes than its file.
 
     They are unchanged with all modes, or if they can produce all modal forces. Else they produce those on coordinates
     of the equations, and may bend the link in the modes left out.

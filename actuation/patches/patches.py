@@ -36,7 +36,7 @@ class ReachedModes:
     served: int  # number of the p', the first ones, that are no attachment modes
 
     def forces(self, F_p: Array) -> Array:
-        """Return modal forces (T, m) on p' from those (T, n) of the body, both N/√kg; or other derivatives by modes."""
+        """Modal forces (T, m) on p' from those (T, n) of the body, both N/√kg; or other derivatives by modes."""
         return F_p[:, self.rows] @ self.T
 
     def coordinates(self, p: Array) -> Array:
@@ -77,12 +77,12 @@ class Reach:
 
     @property
     def serves_all(self) -> bool:
-        """Whether voltages can produce all forces on the served modes."""
+        """Return whether voltages can produce all forces on the served modes."""
         return self.Phi_V.shape[1] >= self.served and not self.unreached_modes.size
 
 
 def served_first(served: int, n: int, patches: int) -> Array:
-    """Return roots (rows, n), no unit, of weights that prefer the first `served` of n modes.
+    """Roots (rows, n), no unit, of weights that prefer the first `served` of n modes.
 
     Other modes have weights only if there are more `patches`.
     """
@@ -91,7 +91,7 @@ def served_first(served: int, n: int, patches: int) -> Array:
 
 
 def weights(layout: PztLayout, served: int, stiffness: Array, points: Mapping[str, Array]) -> Array:
-    """Return root weights W_sqrt (rows, n), no unit, of modes, or of deflections Φ(x) K⁻¹ r by unmet modal forces r.
+    """Root weights W_sqrt (rows, n), no unit, of modes, or of deflections Φ(x) K⁻¹ r by unmet modal forces r.
 
     The first `served` of n modes have `stiffness` (n,), rad²/s², and at points by name Φ (components, n), 1/√kg. Raises
     `InputError` for weights that do not fit.
@@ -124,7 +124,7 @@ OUT_OF_REACH = 1e-9  # of the largest modal force per volt: less is round-off
 
 
 def reached_modes(per_volt: Array, body: ModalBody, spatial: Body) -> ReachedModes:
-    """Return the modes of the families that k patches excite, by their modal forces per volt (k, n), N/(√kg·V)."""
+    """The modes of the families that k patches excite, by their modal forces per volt (k, n), N/(√kg·V)."""
     size = np.abs(per_volt).max(axis=0)
     return _modes_of(frozenset(body.family[k] for k in np.flatnonzero(size > OUT_OF_REACH * size.max())), body, spatial)
 
@@ -151,7 +151,7 @@ class Voltages:
     served: int  # number of modes, the first ones, that the patches are to serve
 
     def at(self, rows: Indices) -> "Voltages":
-        """Return the voltages at some outputs alone, by their indices (k,)."""
+        """The voltages at some outputs alone, by their indices (k,)."""
         return Voltages(self.required[rows], self.within_limit[rows], self.unmet[rows], self.served)
 
     @property
@@ -185,7 +185,7 @@ def voltage_gain(patches: Reach) -> Array:
 
 
 def allocation(patches: Reach, *, limited: bool) -> _core.Allocation:
-    """Return the map from modal forces (n,), N/√kg, to voltages (k,), V, with limits of the patches or without."""
+    """The map from modal forces (n,), N/√kg, to voltages (k,), V, with limits of the patches or without."""
     lower, upper = (patches.amplifiers if limited else patches.amplifiers.unlimited()).range
     return _core.Allocation(patches.Phi_V, patches.W_sqrt, voltage_gain(patches), lower, upper, voltage_scale(patches))
 
@@ -244,7 +244,7 @@ class PatchArray(Reach):
 
 
 def patch_edges(layout: PztLayout, length: float) -> Array:
-    """Return where the patches of `layout` begin and end (k, 2), m from the root of a link of that `length`, m."""
+    """Where the patches of `layout` begin and end (k, 2), m from the root of a link of that `length`, m."""
     if layout.centers is not None:
         centers = np.array(layout.centers)
     else:

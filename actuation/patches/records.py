@@ -266,12 +266,12 @@ class PztLayout(Record):
             raise ValueError(f'expected a face and coupling = "rotation" with an offset, found {found}')
 
     def capacitance(self, *, clamped: bool = False) -> float:
-        """Return the capacitance of one patch with all layers and faces, F: free to strain, or clamped."""
+        """The capacitance of one patch with all layers and faces, F: free to strain, or clamped."""
         volume = self.length * self.width * self.thickness * self.layers * (2 if self.face == "both" else 1)
         return volume * (self.permittivity / self.spacing**2 - (self.lamina.energy if clamped else 0.0))
 
     def amplifiers(self) -> Amplifiers:
-        """Return the amplifiers of all k patches, with their hysteresis."""
+        """The amplifiers of all k patches, with their hysteresis."""
         of, k = self.amplifier or Amplifier(), self.patch_count
 
         def each(value: float | tuple[float, ...] | None) -> Array:
@@ -294,7 +294,7 @@ class PztLayout(Record):
         )
 
     def with_one_limit(self, **changes: object) -> Self:
-        """Return a changed copy with one range of voltages for all patches, whose number may change."""
+        """A changed copy with one range of voltages for all patches, whose number may change."""
         lowest, highest = self.amplifiers().range
         of_all = Amplifier.model_construct(range=(float(lowest.max()), float(highest.min())))
         return self.model_copy(update={"limit": None, "amplifier": of_all, "allocation": "least-squares", **changes})
@@ -383,7 +383,7 @@ class PztLayout(Record):
 
     @property
     def is_driven(self) -> bool:
-        """Whether voltages drive the patches."""
+        """Return whether voltages drive the patches."""
         return self.electrodes == "driven" and self.shunt is None
 
     @property

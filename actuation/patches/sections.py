@@ -35,7 +35,7 @@ class LinkSections:
     middle: Array  # (k, 2) between the faces along y and z, from the axis, m
 
     def extent(self, normal: Literal["y", "z"], side: float = 0.0) -> Array:
-        """Return extents (k,) along a normal, m; for `side` ±1, twice the distance of that face from the axis."""
+        """Extents (k,) along a normal, m; for `side` ±1, twice the distance of that face from the axis."""
         between, axis = (self.height, 0) if normal == "y" else (self.width, 1)
         return between + 2 * side * self.middle[:, axis]
 
@@ -47,7 +47,7 @@ class LinkSections:
         return first[same.ravel()]
 
     def shear_lever(self, station: int, normal: Literal["y", "z"], patch_width: float) -> float:
-        """Return β: mean shear of the surface under a patch by unit twist, over its distance from the axis.
+        """β: mean shear of the surface under a patch by unit twist, over its distance from the axis.
 
         It is 1 of round sections (γ = r φ'), 2 of thin strips (γ = 2 d φ', plates), St Venant's of other rectangles.
         `patch_width` is in m.
@@ -64,7 +64,7 @@ _surface_shear = lru_cache(surface_shear)  # a series, asked for at each station
 
 @lru_cache(maxsize=4)
 def link_sections(body: ModalBody) -> LinkSections:
-    """Return the section properties of a modal body."""
+    """The section properties of a modal body."""
     stations = body.stations
     k = len(stations.height)
     unknown = np.full(k, np.nan)
@@ -120,7 +120,7 @@ def check_width(body: ModalBody, layout: PztLayout, edges: Array) -> None:
 
 
 def potentials(body: ModalBody, x: Array) -> Array:
-    """Return rotations and displacement φ_z, u, φ_x, −φ_y (m, 4, n) of n modes at x (m,), m: rad and m per m·√kg.
+    """Rotations and displacement φ_z, u, φ_x, −φ_y (m, 4, n) of n modes at x (m,), m: rad and m per m·√kg.
 
     Their derivatives by x are the strains.
     """
@@ -129,34 +129,34 @@ def potentials(body: ModalBody, x: Array) -> Array:
 
 
 def side(layout: PztLayout) -> float:
-    """Return 1.0 of patches on the face at largest y (or z), -1.0 at smallest, 0.0 on both faces or no named one."""
+    """1.0 of patches on the face at largest y (or z), -1.0 at smallest, 0.0 on both faces or no named one."""
     return {"+": 1.0, "-": -1.0}.get((layout.face or " ")[0], 0.0)
 
 
 def bending_row(layout: PztLayout) -> int:
-    """Return the index, in the four strains of a section, of the curvature towards the patches' normal."""
+    """The index, in the four strains of a section, of the curvature towards the patches' normal."""
     return BEND_Y if layout.normal == "y" else BEND_Z
 
 
 def own_row(layout: PztLayout) -> int:
-    """Return the index in e of the strain that the layout actuates."""
+    """The index in e of the strain that the layout actuates."""
     return TWIST if layout.bends == "twist" else bending_row(layout)
 
 
 def across_row(layout: PztLayout) -> int:
-    """Return the index in e of the curvature across the patches' width."""
+    """The index in e of the curvature across the patches' width."""
     return BEND_Z if layout.normal == "y" else BEND_Y
 
 
 def felt_rows(layout: PztLayout) -> Indices:
-    """Return indices (any,) in strains e (see `layer_loads`) of those that interact with the patches."""
+    """Indices (any,) in strains e (see `layer_loads`) of those that interact with the patches."""
     if layout.face is None:
         return np.array([own_row(layout)])
     return np.flatnonzero([True, True, layout.lamina.shears, True])
 
 
 def layer_section(layout: PztLayout, extent: float) -> tuple[float, float, float]:
-    """Return (A, S, I) = w ∫ (1, η, η²) dη over all layers, m², m³, m⁴; η from the link's axis.
+    """(A, S, I) = w ∫ (1, η, η²) dη over all layers, m², m³, m⁴; η from the link's axis.
 
     `extent` is t_b (m) of the link along their normal; layers without a named face lie on one.
     """
@@ -168,7 +168,7 @@ def layer_section(layout: PztLayout, extent: float) -> tuple[float, float, float
 
 
 def layer_loads(layout: PztLayout, extent: float, lever: float) -> tuple[Array, Array]:
-    """Return C (4, 4), f (4,) of loads P = f V − C e, N·m and N, of the layers by strains e = (φ_z', u', φ_x', −φ_y').
+    """C (4, 4), f (4,) of loads P = f V − C e, N·m and N, of the layers by strains e = (φ_z', u', φ_x', −φ_y').
 
     The link has `extent` t_b (m) along their normal; `lever` is β of `LinkSections.shear_lever`. Along the strain that
     they actuate, f of plain ceramic on one face is E_p d31 w_p times the sum of the layers' arms t_b/2 + (i − ½) t_p

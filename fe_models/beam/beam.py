@@ -45,7 +45,7 @@ class FamilyModel:
 
 
 def family_model(link: BeamLink, family: Family, forms: "BeamForms", stations: Array) -> FamilyModel:
-    """Return the eigenproblem of `family` on the elements of `forms`, its fields at `stations` (k,), m."""
+    """The eigenproblem of `family` on the elements of `forms`, its fields at `stations` (k,), m."""
     if family in ("axial", "torsion"):
         V = lagrange(forms.nodes, 3)  # K = ∫EA u' v' dx, M = ∫ρA u v dx
         EA, rhoA = rod_properties(link, family, forms.nodes)
@@ -115,7 +115,7 @@ class BeamForms:
         by: Functions | None = None,
         derivative_by: int | None = None,
     ) -> sp.csr_matrix:
-        """Return ∫ weight f⁽ᵈ⁾ g⁽ᵈ⁾ dx, x in m, for weights (e,), any unit: test functions f `of`, trial ones g `by`.
+        """∫ weight f⁽ᵈ⁾ g⁽ᵈ⁾ dx, x in m, for weights (e,), any unit: test functions f `of`, trial ones g `by`.
 
         By default g = f, and both derivatives d are `derivative`.
         """

@@ -37,7 +37,7 @@ class Functions:
         return np.diff(self.nodes)
 
     def at(self, x: Array, derivative: int = 0) -> sp.csr_matrix:
-        """Return the matrix (k, size) of values, no unit, or of a `derivative` by x, 1/m, at points x (k,), m."""
+        """The matrix (k, size) of values, no unit, or of a `derivative` by x, 1/m, at points x (k,), m."""
         cell = np.clip(np.searchsorted(self.nodes, x, side="right") - 1, 0, len(self.element) - 1)
         return self._within(cell, (x - self.nodes[cell]) / self.lengths[cell], derivative)
 
@@ -72,7 +72,7 @@ def gram(B: sp.csr_matrix) -> sp.csr_matrix:
 
 
 def lagrange(nodes: Array, degree: int) -> Functions:
-    """Return polynomials of degree 2 or 3 by values at Gauss–Lobatto points of elements between `nodes` (e + 1,), m."""
+    """Polynomials of degree 2 or 3 by values at Gauss–Lobatto points of elements between `nodes` (e + 1,), m."""
     inner = {2: [0.0], 3: [-np.sqrt(0.2), np.sqrt(0.2)]}[degree]
     X = 0.5 * (1.0 + np.array([-1.0, *inner, 1.0]))
     element = degree * np.arange(nodes.size - 1)[:, None] + np.arange(degree + 1)
@@ -81,7 +81,7 @@ def lagrange(nodes: Array, degree: int) -> Functions:
 
 
 def hermite(nodes: Array) -> Functions:
-    """Return cubic Hermite polynomials, by value and slope at each of `nodes` (e + 1,), m."""
+    """Cubic Hermite polynomials, by value and slope at each of `nodes` (e + 1,), m."""
     powers = np.array([[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]], dtype=np.float64).T
     element = 2 * np.arange(nodes.size - 1)[:, None] + np.arange(4)
     return Functions(nodes, np.repeat(nodes, 2), element, powers, np.array([0, 1, 0, 1]))

@@ -25,7 +25,7 @@ def contains(record: SectionRecord, y: float, z: float) -> bool:
 
 
 def section_stress(record: SectionRecord, section: Section, F: Array, M: Array, y: float, z: float) -> Array:
-    """Return stress (6, n), rows xx, yy, zz, yz, xz, xy, Pa, at the point (y, z), m from the axis.
+    """Stress (6, n), rows xx, yy, zz, yz, xz, xy, Pa, at the point (y, z), m from the axis.
 
     F (3, n) N and M (3, n) N·m about the centroid: what the part beyond the section exerts on it, in n cases.
     """

@@ -24,12 +24,12 @@ def rod_properties(link: BeamLink, family: Family, nodes: Array) -> tuple[Array,
 
 
 def cellwise(link: BeamLink, nodes: Array, name: str) -> Array:
-    """Return a property (e,) of `Section`, in its own unit, of each element between `nodes` (e + 1,), m."""
+    """A property (e,) of `Section`, in its own unit, of each element between `nodes` (e + 1,), m."""
     return section_property(link, 0.5 * (nodes[1:] + nodes[:-1]), name)
 
 
 def section_property(link: BeamLink, x: Array, name: str) -> Array:
-    """Return a property (k,) of `Section`, in its own unit, at x (k,), m; at a step of the section, beyond it."""
+    """A property (k,) of `Section`, in its own unit, at x (k,), m; at a step of the section, beyond it."""
     return np.array([getattr(section, name) for section in link.sections])[segments(link, x)]
 
 
@@ -42,7 +42,7 @@ ROUND_CORNERS = 16  # of the polygon that stands for a circle; divisible by 4
 
 
 def section_outlines(sections: Sequence[SectionRecord]) -> Array:
-    """Return corners (s, q, 2), (y, z) in m, of each section's outer outline, counter-clockwise about x.
+    """Corners (s, q, 2), (y, z) in m, of each section's outer outline, counter-clockwise about x.
 
     Four where all are rectangles; otherwise rectangles have further ones along their sides.
     """

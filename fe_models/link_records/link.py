@@ -68,7 +68,7 @@ class OrthotropicMaterial(Record):
 
 
 def _symmetry(material: object) -> str:
-    """Which record a material table is: three Young's moduli make it orthotropic."""
+    """Return which record a material table is: three Young's moduli make it orthotropic."""
     moduli = (
         material.get("youngs_modulus") if isinstance(material, Mapping) else getattr(material, "youngs_modulus", None)
     )
@@ -245,7 +245,7 @@ class SolidLink(_Link):
         return self.reference.coupling or ("rigid" if self.reference.holds_root else "mean")
 
     def part(self, path: Path) -> PartTables:
-        """Return the tables that determine the mesh; `path` is the link file."""
+        """The tables that determine the mesh; `path` is the link file."""
         return PartTables(path, self.geometry, self.mesh, self.interface, self.surface_patch)
 
     @property

@@ -49,7 +49,7 @@ class Inertia:
     total: Callable[[Array], Array]
 
     def without(self, X: Array, U: Array) -> Array:
-        """Return U (m, k), any unit, M-orthogonal to X (m, n), XᵀMX = I, to round-off."""
+        """U (m, k), any unit, M-orthogonal to X (m, n), XᵀMX = I, to round-off."""
         for _ in range(2):
             U = U - X @ self.total(X.T @ self.mass(U))
         return U
@@ -64,7 +64,7 @@ class ModeSet:
     X: Array  # (m, n) in 1/√kg, with XᵀMX = I
 
     def followed_by(self, more: "ModeSet") -> "ModeSet":
-        """Return these modes and, after them, `more`."""
+        """These modes and, after them, `more`."""
         omega2 = np.concatenate([self.omega2, more.omega2])
         return ModeSet(omega2, (*self.families, *more.families), np.concatenate([self.X, more.X], axis=1))
 

@@ -191,7 +191,7 @@ class ModalBody(Integrals, Frozen):
 
 
 def _problems(body: ModalBody) -> Iterator[str]:
-    """What does not hold of a modal body; the first one counts."""
+    """Return what does not hold of a modal body; the first one counts."""
     k = body.stations.position.shape[0]
     if body.kind not in ("beam", "solid"):
         yield f'kind: expected "beam" or "solid", found {body.kind}'
@@ -244,7 +244,10 @@ def _inertia(body: ModalBody) -> Iterator[str]:
 
 
 def moving_along(body: Integrals, S_spin: Array | None) -> Array:
-    """∫ρ φ_kᵀφ_k dV (3, n, n), no unit, along each axis k, less the mean φ_k: positive where mass exists."""
+    """∫ρ φ_kᵀφ_k dV (3, n, n), no unit, along each axis k, less the mean φ_k: positive where mass exists.
+
+    `S_spin` (n, n), no unit, which z has besides, is left out.
+    """
     S = body.S_bar
     each = np.einsum("kkab->kab", body.S_bar_kl) - np.einsum("ka,kb->kab", S, S) / body.mass
     each[2] -= 0.0 if S_spin is None else S_spin

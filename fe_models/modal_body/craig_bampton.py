@@ -103,7 +103,7 @@ def constraint_modes(omega2: Array, families: Sequence[str], interfaces: Mapping
 def interface_coordinates(
     omega2: Array, families: Sequence[str], static: int, interfaces: Mapping[str, Interface]
 ) -> InterfaceCoordinates:
-    """Return interface coordinates from ω² (n,) in rad²/s², families of n modes and the number of `static` shapes.
+    """Interface coordinates from ω² (n,) in rad²/s², families of n modes and the number of `static` shapes.
 
     Raises `InputError` for interfaces so near to each other that they cannot move by themselves.
     """
@@ -153,7 +153,7 @@ class CraigBampton:
 
 
 def craig_bampton(body: ModalBody) -> CraigBampton:
-    """Return Craig–Bampton matrices of a body with this reference condition, exactly from its invariants."""
+    """Craig–Bampton matrices of a body with this reference condition, exactly from its invariants."""
     omega2 = np.diag(body.stiffness)
     static = body.mode_count - body.eigenmode_count
     coordinates = interface_coordinates(omega2, body.family, static, body.interfaces)

@@ -71,14 +71,14 @@ class KrylovSchur:
         self._X, self._theta = np.empty((rows, 0)), np.empty(0)
 
     def lowest(self, count: int) -> Array:
-        """Return the lowest modes X (m, count), XᵀMX = I to round-off, ω² ascending; errors as of `candidates`."""
+        """The lowest modes X (m, count), XᵀMX = I to round-off, ω² ascending; errors as of `candidates`."""
         X = self.candidates(count)
         while not self.complete(count):
             X = self.candidates(count)
         return X
 
     def candidates(self, count: int) -> Array:
-        """Return the lowest modes X (m, count), XᵀMX = I; one of several equal ones may lack: `complete` finds it.
+        """The lowest modes X (m, count), XᵀMX = I; one of several equal ones may lack: `complete` finds it.
 
         Raises `SolveError` where fewer modes are above round-off, or too few converge.
         """

@@ -40,7 +40,7 @@ class Lump:
 
 
 def lump_weights(mass: float, inertia: Iterable[float]) -> Array:
-    """Return weights (6,) m, m, m, J_x, J_y, J_z, kg and kg·m², of an interface with motion B (6, dofs).
+    """Weights (6,) m, m, m, J_x, J_y, J_z, kg and kg·m², of an interface with motion B (6, dofs).
 
     M gains Bᵀ diag(weights) B.
     """
@@ -57,7 +57,7 @@ def lumps(records: "Iterable[InterfaceRecord]", interfaces: Mapping[str, Interfa
 
 
 def with_lumped_masses(integrals: Invariants, attached: Iterable[Lump]) -> Invariants:
-    """Return the integrals (names and shapes of `ModalBody`) of the link with its lumped masses added.
+    """The integrals (names and shapes of `ModalBody`) of the link with its lumped masses added.
 
     Raises `InputError` for moments of inertia that no body has, where they outweigh those of the link.
     """
@@ -76,7 +76,7 @@ def with_lumped_masses(integrals: Invariants, attached: Iterable[Lump]) -> Invar
 
 
 def with_added(integrals: Of, added: Mapping[str, Any]) -> Of:
-    """Return `integrals` with `added` added to the fields of the same names."""
+    """`integrals` with `added` added to the fields of the same names."""
     return replace(integrals, **{key: getattr(integrals, key) + more for key, more in added.items()})
 
 

@@ -21,7 +21,7 @@ FARTHEST = 2.0  # times the computed frequency: beyond it the rows are of other 
 
 
 def with_measured(body: ModalBody, link: Link) -> ModalBody:
-    """Return the modal body with measured values of `link` put in; unchanged where there are none.
+    """The modal body with measured values of `link` put in; unchanged where there are none.
 
     Rows of modes that the body does not have are left out. Raises `InputError` where no row is of a mode of the body,
     or a frequency is far from the computed one.
@@ -70,7 +70,7 @@ def _with_frequency(body: ModalBody, frequency: Array) -> ModalBody:
 
 
 def damping_ratio(link: Link, omega: Array) -> Array:
-    """Return ζ (n,), no unit, as given, or of Rayleigh damping D = aM + bK: a/(2ω) + bω/2; `omega` (n,) is ω in rad/s.
+    """ζ (n,), no unit, as given, or of Rayleigh damping D = aM + bK: a/(2ω) + bω/2; `omega` (n,) is ω in rad/s.
 
     A list is for the eigenmodes: its last number is that of the attachment modes, too.
     """
@@ -84,7 +84,7 @@ def damping_ratio(link: Link, omega: Array) -> Array:
 
 
 def canonical_signs(fields: Array) -> Array:
-    """Return factors 1 or −1 (n,) of each mode; `fields` (6, k, n): u, v, w (m), φ_x, φ_y, φ_z (rad), root first.
+    """Factors 1 or −1 (n,) of each mode; `fields` (6, k, n): u, v, w (m), φ_x, φ_y, φ_z (rad), root first.
 
     The dominant translation is then positive at the station nearest the root where it exceeds half its largest value;
     of a mode without translation, the dominant rotation.

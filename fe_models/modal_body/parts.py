@@ -177,7 +177,7 @@ class AlongAxis(NamedTuple):
 
 
 def interpolate(stations: Stations, x: Array) -> AlongAxis:
-    """Return the modes at `x` (q,), m, within the stations; see `ModalBody.interpolate`."""
+    """The modes at `x` (q,), m, within the stations; see `ModalBody.interpolate`."""
     element = stations.element
     if element is None:
         return _hermite(stations, x)

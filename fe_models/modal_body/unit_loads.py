@@ -59,9 +59,10 @@ def inertia_wrenches(x: Array, mass: Array, inertia: Array) -> Array:
 def work_on_modes(
     S_bar: Array, I_bar: Array, interfaces: Mapping[str, Interface], h_spin: Array | None = None
 ) -> dict[str, Array]:
-    """Return modal forces Φᵀb (n,), N/√kg, of each unit load b, from invariants of a link and modes at interfaces.
+    """Modal forces Φᵀb (n,), N/√kg, of each unit load b, from invariants of a link and modes at interfaces.
 
-    `h_spin` (n,), m·√kg: ∫ρI_p φ dx of a line of mass with twist φ, not in `I_bar`.
+    `S_bar` (3, n), √kg, `I_bar` (3, 3, n), m·√kg: see `Integrals`. `h_spin` (n,), m·√kg: ∫ρI_p φ dx of a line of mass
+    with twist φ, not in `I_bar`.
     """
     cross = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}
     work = dict[str, Array]()

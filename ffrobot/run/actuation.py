@@ -42,7 +42,7 @@ class Actuation:
     feasibility: "Feasibility"  # whether motors and patches keep their limits
 
     def at(self, rows: Indices) -> "Actuation":
-        """Voltages and forces at the outputs with numbers `rows` alone; the feasibility stays that of all outputs."""
+        """Voltages and forces at outputs with numbers `rows` (k,) alone; the feasibility stays that of all outputs."""
         voltages = {name: of_layout.at(rows) for name, of_layout in self.voltages.items()}
         return replace(self, voltages=voltages, unmet={name: values[rows] for name, values in self.unmet.items()})
 

@@ -235,7 +235,7 @@ def limits_of(scene: Scene, acceleration: float, jerk: float) -> Limits:
 
 
 def peaks(times: Array, values: Array) -> Array:
-    """Return peaks (3, n) of speed, acceleration, jerk, rad or m, s, of a motion (T, n), rad or m, rest to rest."""
+    """Peaks (3, n) of speed, acceleration, jerk, rad or m, s, of `values` (T, n) at `times` (T,), s, rest to rest."""
     largest, usual = [], float(np.median(np.diff(times)))
     times = np.concatenate([[times[0] - usual], times, [times[-1] + usual]])
     values = np.vstack([values[:1], values, values[-1:]])

@@ -140,7 +140,10 @@ class Servo:
         return np.flatnonzero(~self.model.tree.joint_columns)
 
     def slopes(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
-        """Derivatives (N, n + motors, n), SI units, of residual modal forces and motor torques by p̈, ṗ and p."""
+        """Derivatives (N, n + motors, n), SI units, of residual modal forces and motor torques by p̈, ṗ and p.
+
+        At `times` (N,), s; p, ṗ = v and p̈ = a are (N, n), m·√kg and s.
+        """
         return left_slopes(self.model, self.motion, (p, v, a), times, self.postures(times))
 
 

@@ -23,7 +23,7 @@ RIGID = 1e-9  # of the largest strain of a unit motion, in units of its spring: 
 class Vibrations(NamedTuple):
     """Vibrations of M q̈ + D q̇ + K q = −C_vᵀλ, C_v q̇ = 0 about rest, without rigid motion. SI units.
 
-    frequency ω (n,) rad/s ascending; damping_ratio (n,), no unit; shape (n_v, n), M-orthonormal; K (n_v, n_v).
+    frequency ω (n,) rad/s ascending; damping_ratio (n,), no unit; shape (n_v, n), M-orthonormal; springs K (n_v, n_v).
     """
 
     frequency: Array

@@ -135,7 +135,7 @@ def motion_forces(system: MultibodySystem, states: States, times: Array, multipl
 
 
 def multiplier_forces(system: MultibodySystem, q: Array, times: Array, multipliers: Array) -> MotionForces:
-    """Forces in joints and constraints by multipliers (T, rows), N or N·m, alone, at `times` (T,), s."""
+    """Forces in joints and constraints by multipliers (T, rows) alone, at q (T, n_q) and `times` (T,), SI units."""
     forces = system.core.multiplier_forces(system.scene, times.tolist(), q, multipliers * system.model.row_signs)
     return MotionForces(system, forces)
 

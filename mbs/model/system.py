@@ -21,7 +21,7 @@ from .projection import Plane, in_plane
 
 
 class Integrated(NamedTuple):
-    """Mechanism of the core, its loads and targets (`scene`), and indices in the model of its constraint equations."""
+    """Mechanism of the core, its loads and targets (`scene`); indices `rows` (k,) of its equations in the model."""
 
     core: _core.PlanarModel | _core.SpatialModel
     scene: _core.TreeScene
@@ -264,7 +264,7 @@ def _add_motors(driven: _core.PlanarDriven | _core.SpatialDriven, model: Model) 
 
 
 def path_forces(model: Model, times: Array, q: Array, multipliers: Array) -> Array:
-    """Generalized forces −C_sᵀλ_s (T, n_v) of paths by multipliers (T, rows), N or N·m, at q (T, n_q); SI."""
+    """Generalized forces −C_sᵀλ_s (T, n_v) of paths by multipliers (T, rows) at q (T, n_q), `times` (T,); SI."""
     return driven_mechanism(model).path_forces(times.tolist(), q, multipliers * model.row_signs)
 
 
@@ -276,7 +276,10 @@ def frames_in_core(model: Model, q: Array) -> list[tuple[Array, Array]]:
 
 
 def path_forces_on_bodies(model: Model, times: Array, q: Array, multipliers: Array) -> dict[str, Array]:
-    """Return, by body, path forces (T, 6 + n) on it: N, N·m on its frame in its axes, N/√kg on its modes."""
+    """Return, by body, path forces (T, 6 + n) on it: N, N·m on its frame in its axes, N/√kg on its modes.
+
+    By `multipliers` (T, rows), N or N·m, at `times` (T,), s, and q (T, n_q), SI.
+    """
     driven = driven_mechanism(model, has_motors=False)
     on_bodies = driven.path_forces_on_bodies(times.tolist(), q, multipliers * model.row_signs)
     by_body = {}

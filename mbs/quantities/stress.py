@@ -93,7 +93,7 @@ class Recovery:
         return np.concatenate([self.modal, self.sizes, *sections], axis=1)
 
     def at(self, rows: Indices) -> "Recovery":
-        """The recovery of the outputs with numbers `rows`."""
+        """The recovery of the outputs with numbers `rows` (k,)."""
         of = self.sections
         if of is not None:
             of = replace(of, moment=of.moment[rows], force=of.force[rows], modal_force=of.modal_force[rows])

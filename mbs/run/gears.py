@@ -158,7 +158,7 @@ class GearSpring(NamedTuple):
 def gear_motion(
     spring: GearSpring, time: Array, tau: Array, rotor: Array, gamma: Array, curve: GearCurve | None = None
 ) -> GearMotion:
-    """The motion of a gear from the motor torque `tau` (T,), N·m, with a rigid gear.
+    """The motion of a gear from the motor torque `tau` (T,), N·m, with a rigid gear, at `time` (T,), s.
 
     `rotor` (T,), N·m: the part of it that accelerates the rotor; `gamma` (T, 3): the joint's coordinate, rad, its rate
     and acceleration; `curve`: δ(t), τ(t), where they are known.

@@ -217,7 +217,7 @@ class Run:
             )
 
     def at(self, rows: slice | Sequence[int] | Indices) -> Self:
-        """The run with the outputs of numbers `rows` alone."""
+        """The run with the outputs of numbers `rows` (k,) alone."""
         return self._each(lambda x: x[rows])
 
     def with_rows_of(self, other: "Run", order: Indices) -> Self:

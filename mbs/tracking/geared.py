@@ -60,7 +60,10 @@ class GearedServo(Servo):
         return r, np.hstack([tau, *of_gears])
 
     def slopes(self, times: Array, p: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
-        """Derivatives (N, n + motors + k, n), SI units, of residual modal forces and torques by p̈, ṗ and p."""
+        """Derivatives (N, n + motors + k, n), SI units, of residual modal forces and torques by p̈, ṗ and p.
+
+        At `times` (N,), s; p, ṗ = v and p̈ = a are (N, n), m·√kg and s.
+        """
         found = [super().slopes(times, p, v, a)]
         for servo, column in zip(self.without, p.shape[1] + self.gears.columns, strict=True):
             M, D, K = servo.slopes(times, p, v, a)

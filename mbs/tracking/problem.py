@@ -153,9 +153,9 @@ def _left_over(asked: Transition, tracked: Tracked, tolerance: float) -> tuple[f
 def settled(asked: Transition, breaks: Array, to: float = SETTLED) -> Tracked:
     """The least voltage, on intervals that are halved where V or ë turns until it changes by at most the share `to`.
 
-    Where steps wander, more of the effort joins the objective, on intervals that are all halved. The least of all
-    solutions that converge is taken; one with much force `LOST` between Gauss points did not converge. Far beyond the
-    limits nothing is refined.
+    The first intervals are between `breaks` (N + 1,), s. Where steps wander, more of the effort joins the objective, on
+    intervals that are all halved. The least of all solutions that converge is taken; one with much force `LOST` between
+    Gauss points did not converge. Far beyond the limits nothing is refined.
     """
     best, is_settled = _descend(asked, breaks, CALM[0], to)
     for calm in CALM[1:]:
