@@ -37,7 +37,7 @@ class Functions:
         return np.diff(self.nodes)
 
     def at(self, x: Array, derivative: int = 0) -> sp.csr_matrix:
-        """The matrix (k, size) of values, no unit, or of a `derivative` by x, 1/m, at points x (k,), m."""
+        """The matrix (k, size), SI units, of values, or of the given `derivative` by x, at points x (k,), m."""
         cell = np.clip(np.searchsorted(self.nodes, x, side="right") - 1, 0, len(self.element) - 1)
         return self._within(cell, (x - self.nodes[cell]) / self.lengths[cell], derivative)
 

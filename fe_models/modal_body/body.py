@@ -61,7 +61,7 @@ class ModalBody(Integrals, Frozen):
         length: in m.
         frequency: (n,) in Hz.
         stiffness: (n, n) K_ff = diag(ω²) in rad²/s².
-        modal_mass: (n, n) m_ff = I to 1e-8.
+        modal_mass: (n, n) m_ff = I to 1e-8, no unit.
         damping_ratio: (n,) ζ, no unit.
         damping_of: "link", or "robot" if ζ refers to the vibrations of the assembled robot.
         family: n names; of a residual attachment mode, that of the loads behind it.

@@ -173,7 +173,7 @@ def averaging_times(distance: float, limits: PathLimits) -> tuple[float, float, 
 
 
 def averaged_step(times: Array) -> Piecewise:
-    """A step from 0 to 1, averaged over each of the `times` (m + 1,), s: with m continuous derivatives.
+    """The step from 0 to 1 at t = 0, averaged over each of the `times` (m + 1,), s: m continuous derivatives.
 
     The highest derivative is constant between the sums of some of the times; the others follow by integration.
     """

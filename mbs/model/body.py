@@ -31,8 +31,8 @@ class Stiffening:
     K_x: Array  # (3, 3, n, n) ∫ρ x_k G_l dV at [k, l], no unit
     # (6, n, n) G of each interface along x, y, z, 1/(kg·m), and of its rotation about them, 1/(kg·m²)
     K_points: Mapping[str, Array]
-    # (3, 3, n, n), no unit, part of S̄_kl by the extent of payloads: `Body.S_bar_kl` lacks it, as only equations
-    # with K_x have it
+    # (3, 3, n, n), no unit, part of S̄_kl by the extent of payloads, for equations with K_x alone: `Body.S_bar_kl`
+    # lacks it
     S_turned: Array
 
     def at(self, point: str) -> Array:

@@ -167,7 +167,7 @@ def row_accelerations(system: MultibodySystem, state: States, times: Array) -> A
 
 
 def mass_matrices(system: MultibodySystem, q: Array, t: float = 0.0) -> Array:
-    """Mass matrices (T, n_v, n_v), SI, at q (T, n_q), SI, by forces of unit accelerations."""
+    """Mass matrices (T, n_v, n_v) at q (T, n_q), SI units, by forces of unit accelerations."""
     T, n = len(q), system.model.tree.n_v
     a = np.tile(np.vstack([np.zeros(n), np.eye(n)]), (T, 1))
     states = np.repeat(q, n + 1, axis=0), np.zeros((T * (n + 1), n)), a

@@ -322,7 +322,7 @@ class FrameShare(NamedTuple):
 
 
 def frame_share(model: Model, joint: str, q: Array) -> FrameShare:
-    """Modal forces per torque of a revolute motor on the outer body at q (n_q,), SI: theory.md, Eq. 30."""
+    """Modal forces per torque of a revolute joint's motor on its outer body at q (n_q,), SI: theory.md, Eq. 30."""
     tree = model.tree
     direction, slope = np.zeros(tree.n_v), np.zeros((tree.n_v, tree.n_v))
     node = tree.nodes[tree.carried[joint]]
