@@ -84,7 +84,6 @@ class Linear(InstantAnalysis):
     sensor: tuple[Sensor, ...] = ()
     """Sensors whose readings are outputs, too: exact and continuous, without noise, filters, delay and limits."""
 
-    needs_actuators = True
     refers_to = (("points", "body"),)
 
     def references(self) -> Iterator[Reference]:

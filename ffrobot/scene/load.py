@@ -332,6 +332,3 @@ def _unmet_needs(scene: SceneKeys, analysis: Analysis) -> Iterator[str]:
             continue  # patches alone act, as on a beam that is welded to the ground
         if not getattr(scene, need.table):
             yield f'{need.key}: expected at least one [[{need.table}]] for "{need.value}", found none'
-    # Linear models of 3D scenes may have no inputs.
-    if scene.is_planar and analysis.needs_actuators and not scene.motor_joints and not scene.pzt:
-        yield f'kind: expected motors or [[pzt]] for "{analysis.kind}", found neither: name joints with motor = true'

@@ -58,7 +58,6 @@ class Analysis(Referring):
     is_algebraic: ClassVar[bool] = False  # whether each output is solved for by itself
     is_resumable: ClassVar[bool] = False  # whether a stopped run can be continued, under the same tolerance
     allocates_patches: ClassVar[bool] = False  # whether patches and actuation points must supply the forces it finds
-    needs_actuators: ClassVar[bool] = False  # whether it needs motors or patches
     supplies_all: ClassVar[bool] = False  # whether motors and patches follow the path within its tolerance, or it warns
     follows_jerk: ClassVar[bool] = False  # whether torques jump where the jerk of a path does
     takes_actuation: ClassVar[bool] = False  # whether it replays the actuation of its `source`

@@ -82,7 +82,6 @@ MISTAKES = {
         {"end = 0.2": "end = 0.2, times = [0.1]"},
         ['expected the key "times" only in kind = "linear" or "placement", found kind = "forward"'],
     ),
-    "nothing to act with": ({'type = "revolute"': 'type = "revolute", motor = false'}, ["expected motors or [[pzt]]"]),
     "unknown point": (
         {'about = "swing"': 'about = "swing", points = ["arm.tpi"]'},
         ['"arm.tpi"', 'did you mean "tip"'],
