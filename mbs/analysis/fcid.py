@@ -128,7 +128,7 @@ def _shape(context: Context, analysis: Fcid, model: Model, motion: PrescribedMot
         return [shape[body.name] for body in bodies]
     if analysis.shape == "given":
         return given_shape(path, bodies, analysis)
-    if analysis.shape == "static" and any(body.n_modes for body in bodies):
+    if analysis.shape == "static" and not model.tree.is_rigid:
         return _static(model, bodies, analysis, motion, posture)
     return [[ZERO] * body.n_modes for body in bodies]
 

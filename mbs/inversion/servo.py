@@ -167,7 +167,7 @@ def make_servo(model: Model, end: float, goes_on: Callable[[], bool], kind: str 
                 f'expected for kind = "{kind}" as many {what} as the mechanism has degrees of freedom ({freedom})',
                 count,
             )
-    if not any(node.body.n_modes for node in model.tree.nodes):
+    if model.tree.is_rigid:
         raise InputError(
             f'expected at least one flexible body for kind = "{kind}"', 'only rigid ones: use kind = "pcid"'
         )

@@ -156,6 +156,11 @@ class KinematicTree:
             is_joint[node.p_v] = False
         return is_joint
 
+    @property
+    def is_rigid(self) -> bool:
+        """Whether no body has modes."""
+        return bool(self.joint_columns.all())
+
     def at_rest(self, guesses: Mapping[str, Array]) -> Array:
         """Return q (n_q,), rad and m, of straight links; joints have `guesses` (k,) by name, in scene order, else 0."""
         q = np.zeros(self.n_q)

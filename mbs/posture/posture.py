@@ -73,7 +73,7 @@ def paths_by_bending(model: Model, q: Array) -> tuple[int, tuple[str, ...]]:
     At q (n_q,), rad and m; 0 of robots without flexible links.
     """
     is_loop, now = model.loop_rows, np.zeros(1)
-    if not is_loop.any() or not any(node.body.n_modes for node in model.tree.nodes):
+    if not is_loop.any() or model.tree.is_rigid:
         return 0, ()
     (C_v,) = model.constraints.natural_gradients(q[None], now)
     moving = _largest(mobilities(model, q[None], now)[0].free) > MOVES

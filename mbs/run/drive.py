@@ -122,7 +122,7 @@ class _Integration:
         self.analysis, self.times, self.drives, self.control = analysis, times, drives, control
         self.system = MultibodySystem(model, drives, control.commands if control is not None else ())
         self.is_followed = any(row.is_trajectory for row in model.rows)
-        self.is_rigid = not any(node.body.n_modes for node in model.tree.nodes)
+        self.is_rigid = model.tree.is_rigid
 
     def begin(self, start: State, earlier: Run | None, undeformed: Array | None, *, is_recorded: bool) -> None:
         """Choose the integrator, go on from an `earlier` run, and have the core watch limits and postures."""

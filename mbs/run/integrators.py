@@ -238,7 +238,7 @@ def choose_integrator(
         return Choice("radau", "dry friction is a stiff damper to the light ends of links")
     if (rate := stiffness.friction) * float(np.ptp(times)) > TOO_STIFF:
         return Choice("radau", f"friction is a stiff damper: joints come to rest within {1 / rate:.1e} s")
-    if not model.tree.gears and not any(node.body.n_modes for node in model.tree.nodes):
+    if not model.tree.gears and model.tree.is_rigid:
         return Choice("dop853", "nothing vibrates")
     if is_sampled:
         return Choice("dop853", "every sample of the controller begins anew")
@@ -301,10 +301,9 @@ def stiffness_of(system: MultibodySystem, at: State) -> Stiffness:
 
 
 def _sticks(model: Model) -> bool:
-    nodes = model.tree.nodes
-    joints = (*(node.joint for node in nodes), *model.tree.loops)
+    joints = (*(node.joint for node in model.tree.nodes), *model.tree.loops)
     has_friction = any(friction.coulomb > 0 for joint in joints for friction in joint.frictions)
-    return has_friction and any(node.body.n_modes for node in nodes)
+    return has_friction and not model.tree.is_rigid
 
 
 def _of_links(model: Model) -> float:
