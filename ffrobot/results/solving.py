@@ -31,7 +31,7 @@ from ..run.solve import Keep, run_analyses, solve_scene
 from ..run.watcher import Watcher
 from ..scene.scene import Scene
 from .file import FORMAT, Results
-from .write import GROUP, KEPT, ROWS, input_files, left_out, stopped, write_results
+from .write import GROUP, KEPT, ROWS, STOPPED, input_files, left_out, write_results
 
 COUNTS = ("steps", "rejected", "evaluations", "wall_seconds")
 
@@ -91,12 +91,15 @@ def how_to_go_on(solution: Solution, command: str) -> str:
     """The part of a message on how to resume a stopped run with `command`; empty without one."""
     if not command:
         return ""
-    outcome = stopped(solution)
-    if outcome is None:
-        return "".join(f'; {command} resumes with "{name}"' for name in left_out(solution)[:1])
-    if solution.goes_on(outcome):
-        return f"; {command} resumes from t = {outcome.time_reached:.9g} s"
-    return f'; {command} runs "{outcome.analysis.name}" again from its start'
+    outcomes = {**solution.earlier, **solution.outcomes}
+    for name in (analysis.name for analysis in solution.scene.analysis):
+        if (outcome := outcomes.get(name)) is None:
+            return f'; {command} resumes with "{name}"'
+        if outcome.status in STOPPED and solution.goes_on(outcome):
+            return f"; {command} resumes from t = {outcome.time_reached:.9g} s"
+        if outcome.failed:
+            return f'; {command} runs "{name}" again from its start' if outcome.status in STOPPED else ""
+    return ""
 
 
 def check_same_input(scene: Scene, bodies: Mapping[str, LoadedBody], file: Results) -> None:
@@ -170,7 +173,9 @@ def earlier_runs(file: Results, solution: Solution) -> dict[str, Run]:
             analysis=analysis,
             model=solution.model,
             time=file.time(name),
-            statistics=Statistics(about["status"], choice, **counts, step_ends=ends),
+            statistics=Statistics(
+                about["status"], choice, **counts, step_ends=ends, time_reached=kept["checkpoint"].time
+            ),
             continuation=Continuation(**kept),
             **states,
         )

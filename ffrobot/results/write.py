@@ -360,7 +360,7 @@ def write_state(file: h5py.File, solution: Solution) -> None:
         imported = imported_files(folder, *(one.parent for one in python), *allowed_python())
         names = {os.path.relpath(one, folder.resolve()): digest for one, digest in imported.items()}
         file.attrs["imported_files"] = json.dumps(names)
-    is_kept = stopped(solution) is not None or left_out(solution)
+    is_kept = left_out(solution) or any(run.status in STOPPED for run in solution.outcomes.values())
     for name, run in solution.outcomes.items() if is_kept else ():
         if solution.goes_on(run) and run.continuation is not None:
             group = file[name].create_group(GROUP)
@@ -376,11 +376,6 @@ def left_out(solution: Solution) -> list[str]:
     if any(outcome.failed and outcome.status not in STOPPED for outcome in solution.outcomes.values()):
         return []
     return [one.name for one in solution.scene.analysis if one.name not in solution.outcomes]
-
-
-def stopped(solution: Solution) -> Run | None:
-    """The run of the analysis that was stopped before its end; None without one."""
-    return next((outcome for outcome in solution.outcomes.values() if outcome.status in STOPPED), None)
 
 
 def input_files(scene: Scene) -> dict[str, str]:
