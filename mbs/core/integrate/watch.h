@@ -14,7 +14,8 @@ public:
   // in IntegrationControls.
   Watch(OdeSystem &system, double start, double end, unsigned long max_steps,
         const std::function<bool(double)> &carry_on)
-      : system_(system), end_(end), max_steps_(max_steps), carry_on_(carry_on), t_asked_(start) {}
+      : system_(system), end_(end), brief_(1e-4 * (end - start)), max_steps_(max_steps), carry_on_(carry_on),
+        t_asked_(start) {}
 
   void begin_at(double t) { t_asked_ = t; }
 
@@ -28,7 +29,7 @@ public:
       return IntegrationStatus::interrupted;
     if (counted) {
       const double mean_step = (t - t_asked_) / static_cast<double>(steps_between_questions);
-      collapsed = collapsed || (taken > 0 && mean_step < shortest_steps * system_.initial_step());
+      collapsed = collapsed || (taken > 0 && mean_step < shortest_steps * std::min(system_.initial_step(), brief_));
       t_asked_ = t;
     }
     return collapsed ? IntegrationStatus::step_underflow : IntegrationStatus::completed;
@@ -40,7 +41,8 @@ private:
 
   // A step size that collapses never quite reaches rounding where noise feeds its estimates. Nothing that the equations
   // describe asks for a thousand steps in a row so much shorter, in the mean, than the first one to try, a tenth of the
-  // fastest vibration's radian.
+  // fastest vibration's radian. Where nothing vibrates that is a part of the run, of which the motion may be a brief
+  // one.
   static constexpr double shortest_steps = 1e-5;
 
   // The clock is looked at after one step, two, four and so on while that takes next to no time.
@@ -59,7 +61,7 @@ private:
   }
 
   OdeSystem &system_;
-  double end_;
+  double end_, brief_; // s
   unsigned long max_steps_;
   const std::function<bool(double)> &carry_on_;
   double t_asked_;
