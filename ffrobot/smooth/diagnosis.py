@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ..common.arrays import Array
+from ..common.libraries import scipy
 from ..common.structs import struct
 from ..mbs.fields.paths import Piecewise
 from .recording import Fault, Limits, Recording, evened, faults_of_motion, faults_of_stamps, peaks
@@ -116,10 +117,10 @@ def modes_along(robot: Robot, ride: Ride, *, of_links: bool = False) -> list[Mod
 
 
 def _spectrum(path: Piecewise, frequencies: Array) -> Array:
-    """(F, n) |∫ θ̈ e^(−iωt) dt| of motors, rad/s."""
+    """(F, n) |∫ θ̈ e^(−iωt) dt| of motors, rad/s, at even frequencies (F,), Hz, from 0."""
     fine, of_motors = accelerations(path)
-    kernel = np.exp(-2j * np.pi * np.outer(frequencies, fine))
-    return np.abs(kernel @ of_motors) * (fine[1] - fine[0])
+    turn = np.exp(-2j * np.pi * frequencies[1] * fine[1])
+    return np.abs(scipy.signal.czt(of_motors, len(frequencies), turn, axis=0)) * fine[1]
 
 
 def _resonance(robot: Robot, frequencies: Array, grid: Array, spectrum: Array) -> Iterator[Fault]:

@@ -22,7 +22,7 @@ from ..run.watcher import Watcher
 from ..scene.scene import Scene
 
 TURN = 180 / np.pi
-LATE, UNEVEN = 2.5, 0.02  # of the usual step: a gap, and deviations that are jitter
+LATE, UNEVEN = 2.5, 0.02  # of the usual step: a gap or a pause, and deviations that are jitter
 EVEN = 0.5  # of the roughness by stamps: by even times rows are smoother, so that stamps are off, not rows
 ABRUPT, BESIDE = 4.0, 6  # times the differences of so many rows on both sides: a jump
 NOTABLE = 0.1  # of the largest speed of a joint: a smaller jump of it is none
@@ -51,6 +51,12 @@ class Recording:
     def step(self) -> float:
         """Median time (s) between rows."""
         return float(np.median(np.diff(self.times)))
+
+    @property
+    def pauses(self) -> Booleans:
+        """(T − 1,) whether joints stand still between two rows that are farther apart than others."""
+        is_still = np.abs(np.diff(self.values, axis=0)).max(axis=1) <= STILL
+        return is_still & (np.diff(self.times) > LATE * self.step)
 
     def dense(self, step: float) -> tuple[Array, Array]:
         """Return times (N,), s, at most `step` s apart, and set points (N, n), rad or m, by cubics with recorded rates.
@@ -163,33 +169,34 @@ def faults_of_stamps(recording: Recording) -> Iterator[Fault]:
     if back := int(np.count_nonzero(steps < 0.0)):
         yield Fault("steps back", f"times step back at {back} rows: rows before the latest time are left out")
     steps = np.diff(recording.times)
-    moves = np.ptp(np.stack([recording.values[:-1], recording.values[1:]]), axis=0).max(axis=1) > STILL
-    late = (steps > LATE * usual) & moves
+    late = (steps > LATE * usual) & ~recording.pauses
     if recording.rates is None and late.any() and late.mean() < 0.2:
         k = int(np.where(late, steps, 0.0).argmax())
         yield Fault(
             "gap", f"{late.sum()} gaps of up to {1e3 * steps[k]:.3g} ms in the motion, the longest at"
             f" t = {recording.times[k]:.4g} s: lines bridge them",
         )  # fmt: skip
-    own = steps[~late] - usual * np.maximum(np.round(steps[~late] / usual), 1.0)  # rows may be left out
-    jitter = np.sqrt(np.mean(own**2))
+    own = steps[steps <= LATE * usual]
+    jitter = np.sqrt(np.mean((own - usual * np.maximum(np.round(own / usual), 1.0)) ** 2))  # rows may be left out
     if recording.rates is None and jitter > UNEVEN * usual:
         is_late = evened(recording) is not recording
         evenly = " Rows are smoother at even times: stamps are late, not the motion" if is_late else ""
         yield Fault(
             "jitter", f"steps of {1e3 * usual:.4g} ms jitter by {1e3 * jitter:.3g} ms (RMS), from"
-            f" {1e3 * steps.min():.3g} to {1e3 * steps[~late].max():.3g} ms.{evenly}",
+            f" {1e3 * steps.min():.3g} to {1e3 * own.max():.3g} ms.{evenly}",
         )  # fmt: skip
 
 
 def evened(recording: Recording) -> Recording:
     """Return the recording with rows at even times, if these make a smoother motion than those of their stamps.
 
-    Even times divide the whole duration: the median step is off with jitter.
+    Even times divide the whole duration but pauses: the median step is off with jitter.
     """
     if recording.rates is not None:
         return recording
-    even = np.linspace(recording.times[0], recording.times[-1], len(recording.times))
+    steps = np.diff(recording.times)
+    rests = np.append(0.0, np.where(recording.pauses, steps - recording.step, 0.0).cumsum())
+    even = rests + np.linspace(recording.times[0], recording.times[-1] - rests[-1], len(recording.times))
     rates = (difference_quotients(times, recording.values)[1] for times in (even, recording.times))
     by_even, by_stamps = (np.mean(np.diff(of, axis=0) ** 2) for of in rates)
     return replace(recording, times=even) if by_even < EVEN**2 * by_stamps else recording

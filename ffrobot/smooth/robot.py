@@ -33,13 +33,13 @@ ROUND_OFF = 1e-9  # of the number of outputs
 SLACK = 1e-9  # of the largest stiffness: less is none
 UNKNOWN = 5.0  # Hz, where nothing vibrates
 FIRST = 1e-3  # s, of a run that finds the posture at the start
-FINE = 4000  # instants of motors' accelerations
+FINE, EVERY = 4000, 5e-4  # instants of motors' accelerations at least, and s between them at most
 INSTANTS = 9  # postures along the motion whose frequencies are found
 
 
 def accelerations(path: Piecewise) -> tuple[Array, Array]:
     """Return times (T,), s, to the end of the `path` of n motors, and their accelerations (T, n), rad/s² or m/s²."""
-    fine = np.linspace(0.0, path.end, FINE)
+    fine = np.linspace(0.0, path.end, max(FINE, int(path.end / EVERY) + 2))
     return fine, path.sample(fine, 2)
 
 
