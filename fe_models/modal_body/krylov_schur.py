@@ -161,15 +161,17 @@ class KrylovSchur:
         vector = mass.createVecRight()
         known = [PETSc.Vec().createWithArray(x, comm=self._comm) for x in self._X.T.copy()]
         solver.setDeflationSpace(known)
-        solver.solve()
-        if (found := solver.getConverged()) < count:
-            raise SolveError(f"eigenproblem: {found} of {count} modes converged to {tolerance:g}: request fewer")
         X, theta = np.empty((self._rows, count)), np.empty(count)
-        for k in range(count):
-            theta[k] = 1.0 / solver.getEigenpair(k, vector).real
-            X[:, k] = vector.array_r
-        for used in (solver, transform, mass, vector, *known):  # PETSc keeps what Python alone lets go
-            used.destroy()
+        try:
+            solver.solve()
+            if (found := solver.getConverged()) < count:
+                raise SolveError(f"eigenproblem: {found} of {count} modes converged to {tolerance:g}: request fewer")
+            for k in range(count):
+                theta[k] = 1.0 / solver.getEigenpair(k, vector).real
+                X[:, k] = vector.array_r
+        finally:
+            for used in (solver, transform, mass, vector, *known):  # PETSc keeps what Python alone lets go
+                used.destroy()
         return X, theta
 
     def _orthonormal(self, X: Array) -> Array:
