@@ -153,7 +153,9 @@ def oriented(part: PartMesh) -> PartMesh:
 
 
 def check_quality(part: PartMesh) -> None:
-    """Raise `InputError`, with how many and where, for cells that are inverted or flat."""
+    """Raise `InputError`, with how many and where, for cells that are inverted or flat, or have a node twice."""
+    repeated = (np.diff(np.sort(part.cells)) == 0).any(axis=1)
+    _refuse(part, repeated, "elements with a node twice", "elements of distinct nodes")
     determinants = _determinants(part)
     largest = np.abs(determinants).max(axis=1)
     inverted = determinants.min(axis=1) <= 1e-6 * largest

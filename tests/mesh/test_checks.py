@@ -43,6 +43,8 @@ def test_inverted_elements_are_told(box):
     points[inner] += [0.0, 0.012, 0.0]
     with pytest.raises(InputError, match=r"expected .*, found \d+ inverted elements of \d+, e.g. at \(0\.[45]"):
         check_quality(box.moved(points))
+    with pytest.raises(InputError, match="of distinct nodes, found 1 elements with a node twice of"):
+        check_quality(replace(box, cells=np.vstack([box.cells[1:], np.append(box.cells[0, 1:], box.cells[0, 1])])))
 
 
 def test_flat_elements_are_told():
