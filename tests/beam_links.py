@@ -59,8 +59,8 @@ def flexibility(body, name, other=None):
     return at.motion / np.diag(body.stiffness) @ load.motion.T
 
 
-def moved(body, x):
-    """The modal body with its points, but not its integrals, `x` m away from the origin, as of other programs."""
+def moved(body, x, y=0.0):
+    """The modal body with its points, but not its integrals, away from the origin (m), as of other programs."""
     parts = {"stations": body.stations} | body.interfaces
-    at = {name: replace(part, position=part.position + x * np.eye(3)[0]) for name, part in parts.items()}
+    at = {name: replace(part, position=part.position + np.array([x, y, 0.0])) for name, part in parts.items()}
     return replace(body, stations=at.pop("stations"), interfaces=at)

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from beam_links import beam_link, tube
+from beam_links import beam_link, moved, tube
 from material_points import random_cloud
 
 from ffrobot import InputError, make_link
@@ -52,7 +52,7 @@ def bent(body):
 @pytest.fixture(scope="module")
 def bodies():
     made = {name: make_link(link).body for name, link in (("line", LINK), ("loaded", LOADED), ("held", HELD))}
-    return made | {"bent": bent(made["line"]), "cloud": cloud()}
+    return made | {"bent": bent(made["line"]), "cloud": cloud(), "beside": moved(made["line"], -0.2, 0.05)}
 
 
 def differences(first, second, keys):
@@ -65,7 +65,7 @@ def differences(first, second, keys):
 
 
 @pytest.mark.parametrize("file_format", FORMATS)
-@pytest.mark.parametrize("name", ["line", "loaded", "held", "bent", "cloud"])
+@pytest.mark.parametrize("name", ["line", "loaded", "held", "bent", "cloud", "beside"])
 def test_there_and_back(file_format, name, bodies):
     write, read = FORMATS[file_format]
     body = bodies[name]
@@ -82,6 +82,9 @@ def test_there_and_back(file_format, name, bodies):
             np.testing.assert_array_equal(vars(back.interfaces[label])[key], value)
     ends = [body.interfaces[name].position for name in ("root", "tip")]
     np.testing.assert_array_equal(back.stations.position[[0, -1]], ends)
+    has_line = name not in ("bent", "cloud")
+    assert len(back.stations.position) == (len(body.stations.position) if has_line else 2)
+    assert has_line != any("shapes there are cubics of the two" in line for line in remarks)
     assert back.reference_condition == body.reference_condition
     assert any("geometric stiffness" in line for line in left_out)
     assert any("not in the file" in line for line in remarks)
@@ -104,7 +107,7 @@ def mixed(body, T):
     """What `fem_text` asks for, in coordinates q, p = T q, which `ModalBody` does not take: a congruence with T."""
     at, names = body.stations, [item.name for item in dataclasses.fields(body)]
     return SimpleNamespace(**{name: getattr(body, name) for name in names} | {
-        "mode_count": body.mode_count, "interpolate": body.interpolate, "middle": body.middle,
+        "mode_count": body.mode_count, "interpolate": body.interpolate, "begin": body.begin,
         "modal_mass": T.T @ T, "stiffness": T.T @ body.stiffness @ T,
         "S_bar": body.S_bar @ T, "I_bar": body.I_bar @ T,
         "S_bar_kl": np.einsum("abkl,km,ln->abmn", body.S_bar_kl, T, T),

@@ -257,7 +257,9 @@ def modal_body(name: str, integrals: ShapeIntegrals, nodes: Nodes, text: str) ->
     constraint = constraint_modes(omega2, families, interfaces) if condition == CRAIG_BAMPTON else 0
     if condition == CRAIG_BAMPTON and not constraint:
         condition = "cantilever"  # which holds the root alike
-    omega, line = np.sqrt(omega2), _stations_at(ends)
+    omega, line, stations = np.sqrt(omega2), _stations_at(ends), _stations(nodes, ends, length)
+    if len(stations.position) == len(ends):
+        remarks += ("no node lies between root and tip on a line along x: shapes there are cubics of the two",)
     body = ModalBody(
         name=name,
         kind="beam" if sections["J_spin"] else "solid",
@@ -275,7 +277,7 @@ def modal_body(name: str, integrals: ShapeIntegrals, nodes: Nodes, text: str) ->
         I_bar=without_sections.I_bar,
         S_bar_kl=S_bar_kl,
         interfaces=interfaces,
-        stations=_stations(nodes, ends, length),
+        stations=stations,
         mesh=PictureMesh(line.position, np.array([[0, 1]], dtype=np.int64), line.translation),
         ffrobot_version=VERSION,
         **sections,  # type: ignore[arg-type]
@@ -312,10 +314,11 @@ def _condition(interfaces: Mapping[str, Interface]) -> str:
 
 
 def _stations(nodes: Nodes, ends: list[Interface], length: float) -> Stations:
-    """The nodes on the x axis, ascending, where root and tip are on it, else these two."""
-    on_axis = [at for at in [*ends, *nodes.values()] if np.abs(at.position[1:]).max() <= ON_AXIS * length]
+    """The nodes on the line along x through the root, ascending, where the tip is on it, else these two."""
+    root, limit = ends[0].position, ON_AXIS * length
+    on_axis = [at for at in [*ends, *nodes.values()] if np.abs(at.position - root)[1:].max() <= limit]
     points = sorted(on_axis if on_axis[:2] == ends else ends, key=lambda at: float(at.position[0]))
-    after = [b for a, b in pairwise(points) if b.position[0] - a.position[0] > ON_AXIS * length]
+    after = [b for a, b in pairwise(points) if b.position[0] - a.position[0] > limit]
     return _stations_at([points[0], *after])
 
 
