@@ -152,11 +152,6 @@ class ModalBody(Integrals, Frozen):
         return f"{self.eigenmode_count} modes" + (f" and {static} {kind} modes" if static else "")
 
     @property
-    def middle(self) -> float:
-        """Place x, m, half way along the link."""
-        return self.begin + self.length / 2
-
-    @property
     def begin(self) -> float:
         """Place x, m, from which distances on the axis count: the first station, or the root if stations go beyond."""
         first, last = self.stations.position[[0, -1], 0]
@@ -211,7 +206,7 @@ def _problems(body: ModalBody) -> Iterator[str]:
     first, last = body.stations.position[[0, -1], 0]
     way = (body.interfaces["tip"].position - body.interfaces["root"].position)[0]
     error = min(abs(body.length - last + first), abs(body.length - way))
-    if not error <= INTERFACE_TOLERANCE * body.length or not first <= body.middle <= last:
+    if not error <= INTERFACE_TOLERANCE * body.length or not first <= body.begin + body.length / 2 <= last:
         yield f"length: expected {last - first:g} m, from first to last station, found {body.length} m"
     element = body.stations.element
     if element is not None and not _is_chain(element, k):

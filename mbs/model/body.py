@@ -263,7 +263,7 @@ def from_modal_body(name: str, body: ModalBody, stiffened: bool = False, *, is_p
     S_bar_kl[2, 2] -= S_spin
     omega = 2 * np.pi * body.frequency
     sections = dict(body.interfaces)
-    sections.setdefault("mid", body.interpolate(body.middle))
+    sections.setdefault("mid", body.interpolate(body.begin + body.length / 2))
     return Body(
         name=name,
         mass=body.mass,

@@ -75,14 +75,14 @@ def test_interpolation_reproduces_cubics(body, coefficients, element):
         np.testing.assert_allclose(found.rotation, rotation[0], atol=1e-12)
 
 
-def test_the_middle_lies_half_way_along_the_link(body):
+def test_links_begin_at_their_first_station(body):
     """Also where the origin is elsewhere, as in bodies of other programs, or the root is a face beside the end."""
     here, away = body.interpolate(0.7), moved(body, 2.0)
-    there = away.interpolate(away.middle)
+    there = away.interpolate(away.begin + 0.7)
     np.testing.assert_allclose(there.position, np.array([2.7, 0.0, 0.0]), atol=1e-15)
     np.testing.assert_allclose(there.translation, here.translation, rtol=1e-12)
     root = replace(body.interfaces["root"], position=np.array([0.7, -0.01, 0.0]))
-    assert replace(body, interfaces={**body.interfaces, "root": root}).middle == 0.7
+    assert replace(body, interfaces={**body.interfaces, "root": root}).begin == 0.0
 
 
 def test_hermite_interpolation_needs_no_smoothness_between_stations(body):
