@@ -74,7 +74,7 @@ class LinkPatches:
         return self.per_volt[self.body]
 
     def voltages(self, F_p: Array) -> dict[str, Voltages]:
-        """Voltages by layout for modal forces F_p (T, n), N/√kg; `unmet`: what all layouts together leave."""
+        """Voltages by layout for modal forces F_p (T, n), N/√kg; their `unmet`: what all layouts together leave."""
         found = solve_voltages(self.reach, self.reach.modes.forces(F_p))
         return self._by_layout(found.required, found.within_limit, F_p)
 

@@ -138,7 +138,7 @@ class KinematicTree:
         return tree
 
     def with_bodies(self, bodies: Sequence[Body]) -> "KinematicTree":
-        """The tree with other bodies of the same names, modes and points, in its order."""
+        """The tree with `bodies` in place of its own, in its order, with the same names, modes and points."""
         tree = copy.copy(self)
         tree.nodes = tuple(replace(node, body=body) for node, body in zip(self.nodes, bodies, strict=True))
         return tree

@@ -85,10 +85,10 @@ def functions_within(
 
 
 class OfPaths(NamedTuple):
-    """Constraint forces of paths, N·m and N: `source` has `total` of them.
+    """Constraint forces of paths over time, N·m and N: `source` returns all `total` numbers.
 
     `joints`: their numbers along coordinates of joints; `points`: along global axes at "BODY.POINT", by component.
-    Forces at points in no component are zero.
+    Components that `points` lacks are zero.
     """
 
     source: _core.ForceSource
