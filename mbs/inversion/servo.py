@@ -93,7 +93,6 @@ class Servo:
         motion = _core.PlanarPrescribedMotion(path, self.near[0])
         if self.factor != 1.0 or self.offset:
             motion = _core.PlanarRedefinedMotion(path, path, self.near[0], self.factor, list(self.offset))
-        motion.hold_loads(0.0, self.end)
         return motion
 
     def equations(self) -> _core.SpatialPrescribedMotion:
@@ -103,7 +102,6 @@ class Servo:
         if self.factor != 1.0 or self.offset:
             driven = driven_mechanism(following_motors(self.model)) if self.model.loop_rows.any() else path
             motion = _core.SpatialRedefinedMotion(driven, path, self.near[0], self.factor, list(self.offset))
-        motion.hold_loads(0.0, self.end)
         return motion
 
     def postures(self, times: Array) -> Array:

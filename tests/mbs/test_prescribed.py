@@ -18,7 +18,7 @@ from tree_oracle import row_values, target_rates
 from ffrobot.mbs import _core
 from ffrobot.mbs.fields.functions import state_function
 from ffrobot.mbs.inversion.servo import Servo
-from ffrobot.mbs.model.drives import Command, Drive
+from ffrobot.mbs.model.drives import Command
 from ffrobot.mbs.model.nodes import ConstraintRow, Section
 from ffrobot.mbs.model.system import MultibodySystem, turning_motors
 from ffrobot.mbs.scene.loads import Load
@@ -219,19 +219,6 @@ def with_motors_held(model, motors):
         (row,) = coordinate_rows(tree_oracle.of_coordinate(model.tree, motor.coordinate)[0], [motor.coordinate])
         rows.append(replace(row, target=_core.TimeFunction.constant(0.0)))
     return replace(model, rows=tuple(rows))
-
-
-def test_loads_are_held_before_and_after_the_path():
-    """Loads of time stay outside of an interval what they are at its ends."""
-    model, motors, modes, near = drawn(0, ["revolute"] * 3)
-    direction = np.ones(model.tree.n_v)
-    model = replace(model, modal_loads=(Drive(direction, polynomial(1.0, 20.0, 5.0)),))
-    motion = _core.SpatialPrescribedMotion(in_core(model, motors), near[0])
-    free = motion.motion(TIMES.tolist(), *modes, near).required
-    motion.hold_loads(0.005, 0.02)
-    held = motion.motion(TIMES.tolist(), *modes, near).required
-    change = [20.0 * (t - h) + 2.5 * (t**2 - h**2) for t, h in zip(TIMES, np.clip(TIMES, 0.005, 0.02), strict=True)]
-    np.testing.assert_allclose(held - free, np.outer(change, direction), atol=1e-10)
 
 
 def test_motion_ends_where_a_path_leaves_the_reach():

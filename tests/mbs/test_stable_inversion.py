@@ -137,11 +137,10 @@ def test_actuation_begins_before_the_path_and_ends_after_it():
 
 
 def test_path_that_ends_far_from_where_it_began():
-    """Newton's method goes from the initial angles to another posture, or none, where the path ends."""
+    """Newton's method goes from the initial angles to another posture; a load changes before and after the path."""
     path = {"name": "tip", "point": "link2.tip", "x": quintic(1.6, 1.0, 2.0), "y": quintic(-0.4, 1.2, 2.0)}
-    model = arm(
-        arm_links(EI=300.0), trajectory=[path], gravity=(0.0, 0.0), initial={"angles": {"link1": 0.4, "link2": -0.8}}
-    )
+    load, initial = [{"point": "link2.tip", "y": "0.3*t+0.1"}], {"angles": {"link1": 0.4, "link2": -0.8}}
+    model = arm(arm_links(EI=300.0), trajectory=[path], gravity=(0.0, 0.0), initial=initial, load=load)
     outcome = run(model, motors_only(end=2.0))
     assert outcome.status == "completed"
     replayed = exact_forward(model, outcome)

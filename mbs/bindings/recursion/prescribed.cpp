@@ -228,8 +228,6 @@ template <class Space> void bind_motion(nb::module_ &m, const std::string &space
       .def_prop_ro(
           "driven", [](const Motion &motion) -> const Driven & { return motion.driven(); },
           nb::rv_policy::reference_internal)
-      .def("hold_loads", &Motion::hold_loads, "start"_a, "end"_a,
-           "Loads are constant before and after these times (s).")
       .def("left_on_modes", &left_on_modes<Space>, "times"_a, "p"_a, "p_dot"_a, "p_ddot"_a, "near"_a,
            "(q (T, n_q), forces on modes (T, n)) that neither motors, or constraint equations without any, nor loads "
            "supply,\nwith modes of all bodies (T, n), from postures near (T, n_q), or each from the last, the first "

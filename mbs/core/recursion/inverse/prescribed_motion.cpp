@@ -39,7 +39,7 @@ PrescribedMotion<Space>::PrescribedMotion(DrivenMechanism<Space> driven, const V
               VectorXd::Zero(driven_.mechanism.n_v).eval().data()),
       w_(driven_.mechanism), forces_(driven_.mechanism), sizes_(driven_.mechanism),
       state_(VectorXd::Zero(driven_.mechanism.n_q + driven_.mechanism.n_v)), a_(VectorXd::Zero(driven_.mechanism.n_v)),
-      required_(a_), f_(a_), Q_(a_), step_(a_), first_(-std::numeric_limits<double>::infinity()), last_(-first_) {
+      required_(a_), f_(a_), Q_(a_), step_(a_) {
   const Index equations = driven_.mechanism.constraints.size();
   int joint = 0;
   for (const auto &node : driven_.mechanism.nodes)
@@ -127,7 +127,7 @@ bool PrescribedMotion<Space>::follow(double t, const ModalMotion &modes, std::ve
 }
 
 template <class Space> void PrescribedMotion<Space>::act(double t) {
-  acting_ = motion_.act(std::clamp(t, first_, last_), q(), v());
+  acting_ = motion_.act(t, q(), v());
   forces_.prepare(q(), v(), acting_.generalized, w_);
 }
 
@@ -223,8 +223,7 @@ Derivatives PrescribedMotion<Space>::derivatives_under(const VectorXd &forces, c
   for (Index r = 0; r < target.size(); ++r)
     target[r] = forces_.of_constraint(r, a_.data(), w_).value;
   w_.keep(active);
-  const double t = std::clamp(time_, first_, last_);
-  return recursion::derivatives_under(driven_.scene, t, state_, forces, target, w_);
+  return recursion::derivatives_under(driven_.scene, time_, state_, forces, target, w_);
 }
 
 // With all constraint equations C_ddot stays what it is: its derivatives at given a are -C_v a_q and -C_v a_v. Rows of

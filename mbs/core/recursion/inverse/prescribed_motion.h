@@ -40,9 +40,6 @@ public:
   PrescribedMotion(const PrescribedMotion &) = delete;
   virtual ~PrescribedMotion() = default;
 
-  // Loads are at other times what they are at the nearest of these.
-  void hold_loads(double from, double until) { first_ = from, last_ = until; }
-
   // The next position is found from the joints of q (n_q), without looking at the last one.
   virtual void start_at(const VectorXd &q);
 
@@ -99,7 +96,7 @@ private:
   VectorXd state_, a_, lambda_, required_, f_, value_, rate_;
   VectorXd Q_, step_; // (n_v), (n_v) zero along modes
   LeastNorm factors_;
-  double time_ = 0, first_, last_;
+  double time_ = 0;
   bool goes_on_ = false;
 };
 
