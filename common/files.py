@@ -81,22 +81,26 @@ def check_output(path: Path, file_format: str) -> None:
             f'{path}: output: expected a new name or an earlier file of format "{file_format}"',
             "a file of another kind",
         )
+
+
+def check_parent(path: Path) -> None:
+    """Raise `InputError` for an output that is an input, or in a folder that does not exist or cannot be written."""
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: output: expected a file in a folder that exists", f"no folder {path.parent}")
+    _check_writable(path, path.resolve().parent)
+
+
+def _check_writable(path: Path, folder: Path) -> None:
+    check_not_an_input(path)
+    nearest = next(place for place in (folder, *folder.resolve().parents) if place.exists())
     try:
-        with tempfile.TemporaryFile(dir=path.resolve().parent):
+        with tempfile.TemporaryFile(dir=nearest):
             pass
     except OSError as error:
         raise InputError(f"{path}: output: expected a writable folder, found: {error.strerror or error}") from None
 
 
-def check_parent(path: Path) -> None:
-    """Raise `InputError` for an output in a folder that does not exist, or that is an input."""
-    check_not_an_input(path)
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: output: expected a file in a folder that exists", f"no folder {path.parent}")
-
-
 def _check_no_folder(path: Path, label: str) -> None:
-    check_not_an_input(path)
     if path.is_dir():
         raise InputError(f"{path}: {label}: expected a file name", "a folder")
 
@@ -106,11 +110,12 @@ def check_ending(path: Path, label: str, endings: Sequence[str]) -> None:
     _check_no_folder(path, label)
     if path.suffix.lower() not in endings:
         raise InputError(f"{path}: {label}: expected a name that ends in {either(endings)}", f'"{path.name}"')
+    _check_writable(path, path.parent)
 
 
 def check_new_file(path: Path, *, replace: bool) -> None:
     """Raise `InputError` where an output would overwrite an input, or, unless `replace`, another file."""
-    check_not_an_input(path)
+    check_parent(path)
     if path.exists() and not (replace and path.is_file()):
         raise InputError(f"{path}: output: expected a new name, or --force to replace it", "a file there")
 
@@ -123,10 +128,10 @@ def holds(path: Path, content: bytes) -> bool:
 
 
 def check_folder(folder: Path) -> None:
-    """Raise `InputError` where an output folder is a file or an input; a missing folder is accepted."""
-    check_not_an_input(folder)
+    """Raise `InputError` where an output folder is a file or an input, or cannot be written; it may be missing."""
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder}: output: expected a folder", "a file")
+    _check_writable(folder, folder)
 
 
 def check_new_folder(folder: Path) -> None:

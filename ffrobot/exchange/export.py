@@ -10,7 +10,6 @@ from rich.console import Console
 
 from ..common.errors import InputError, check_known, either, naming, quoted
 from ..common.files import check_new_file, check_new_folder, check_output, check_parent, holds, write_atomically
-from ..common.outputs import check_not_an_input
 from ..common.tables import shown
 from ..common.toml_files import read_text
 from ..fe_models.modal_body import ModalBody
@@ -135,7 +134,6 @@ def write_content(target: Path, content: Content, *, force: bool) -> None:
         check_new_file(target, replace=force or holds(target, data))
         write_atomically(target, data, "exported file")
         return
-    check_not_an_input(target)
     if not all(holds(target / name, data) for name, data in content.items()):
         check_new_folder(target)
     for name, data in content.items():

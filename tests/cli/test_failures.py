@@ -40,8 +40,7 @@ def test_disk_full_while_writing_results(two_link_copy, ffrobot):
     folder = two_link_copy({"scene.toml": SHORT})
     results = folder / "scene.results.h5"
     assert ffrobot("solve", "scene.toml", cwd=folder).returncode == 0
-    content = results.read_bytes()
-    assert len(content) > 20_000
+    assert len(content := results.read_bytes()) > 20_000
     before = sorted(folder.iterdir())
     done = ffrobot("solve", "scene.toml", cwd=folder, preexec_fn=_limit_files)
     assert done.returncode == 1
@@ -62,17 +61,18 @@ def test_full_disk(two_link_copy, ffrobot, small_disk, command):
 
 
 @pytest.mark.parametrize(
-    ("output", "named"),
+    ("command", "output", "named"),
     [
-        ("nowhere/r.h5", "found no folder nowhere"),
-        (".", "found a folder"),
-        ("/proc/r.h5", "expected a writable folder"),  # not even for root
-        ("/dev/null", "expected a regular file, found a device"),  # a rename would replace it
-        ("link1.toml", "another file than the input"),
+        ("solve", "nowhere/r.h5", "found no folder nowhere"),
+        ("solve", ".", "found a folder"),
+        ("solve", "/proc/r.h5", "expected a writable folder"),  # not even for root
+        ("bench", "/proc/bench", "expected a writable folder"),
+        ("solve", "/dev/null", "expected a regular file, found a device"),  # a rename would replace it
+        ("solve", "link1.toml", "another file than the input"),
     ],
 )
-def test_output_that_cannot_be_written(two_link_copy, refused, output, named):
-    assert named in refused(two_link_copy(), "solve", "scene.toml", "-o", output)
+def test_output_that_cannot_be_written(two_link_copy, refused, command, output, named):
+    assert named in refused(two_link_copy(), command, "scene.toml", "-o", output)
 
 
 def test_too_many_steps(two_link_copy, ffrobot):
