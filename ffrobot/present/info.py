@@ -1,6 +1,6 @@
 """Contents of a modal body file, a results file or the file of a part, as text."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -42,9 +42,7 @@ def describe(path: Path) -> str:
     if kind == MODAL_FORMAT:
         body = read_modal_body(path)
         with open_checked(path) as file:
-            datasets = Table("dataset", "shape", "unit", "what")
-            _add_datasets(datasets, file, MODAL_BODY)
-        return _modal_body(body) + _rendered(datasets)
+            return _modal_body(body) + _datasets([file], MODAL_BODY)
     raise InputError(f"{path}: expected a modal body file or a results file", f"format {kind!r}")
 
 
@@ -64,15 +62,14 @@ def _modal_body(body: ModalBody) -> str:
 
 
 def _modes(body: ModalBody) -> Table:
-    computed = None if body.measured is None else body.measured.computed_frequency
-    more = () if computed is None else ("of the model (Hz)",)
+    computed = () if body.measured is None else (body.measured.computed_frequency,)
+    more = ("of the model (Hz)",) * len(computed)
     table = Table("mode", "family", "frequency (Hz)", *more, "ω (rad/s)", "damping ratio")
     for k, family in enumerate(body.family):
         kind = f"{family}, attachment" if body.residual[k] else family
-        row = [f"{body.frequency[k]:.6f}", f"{2 * np.pi * body.frequency[k]:.5f}", f"{body.damping_ratio[k]:g}"]
-        if computed is not None:
-            row.insert(1, f"{computed[k]:.6f}")
-        table.add_row(f"{k + 1}", kind, *row)
+        frequencies = (f"{of[k]:.6f}" for of in (body.frequency, *computed))
+        omega = f"{2 * np.pi * body.frequency[k]:.5f}"
+        table.add_row(f"{k + 1}", kind, *frequencies, omega, f"{body.damping_ratio[k]:g}")
     return table
 
 
@@ -104,37 +101,36 @@ def _optional(body: ModalBody) -> Iterator[str]:
 
 def _results(results: Results) -> str:
     from ..results.tables import loop_cells  # loads the records of scenes
+    from .lines import tables_of
 
     lines = [f"results of scene {results.name!r}, made by ffrobot {results.ffrobot_version}"]
     for name, body in results.modal_files.items():
         lines.append(f"body {name}: {body.path} (sha256 {body.sha256[:12]})")
-    headers = ("analysis", "kind", "status", "outputs", "up to t (s)", "steps", "evaluations", "wall (s)")
-    analyses = Table(*headers)
-    datasets = Table("dataset", "shape", "unit", "what")
+    analyses = Table("analysis", "kind", "status", "outputs", "up to t (s)", "steps", "evaluations", "wall (s)")
     for name in results.analyses:
         time, about = results.time(name), results.attributes(name)
         effort = (str(about["steps"]), str(about["evaluations"]), f"{about['wall_seconds']:.3f}")
         analyses.add_row(name, about["kind"], status_in_words(about), f"{len(time)}", f"{time[-1]:g}", *effort)
-        _add_datasets(datasets, results.group(name), RESULTS)
-    tables = [analyses, datasets]
-    if cells := {name: row for name in results.analyses for row in loop_cells(results, name)}:
-        tables.insert(1, loops := Table("closed loop", *next(iter(cells.values())), box=None, padding=(0, 1, 0, 0)))
-        for name, row in cells.items():
-            loops.add_row(name, *row.values())
-    return "\n".join(lines) + "\n" + "".join(map(_rendered, tables))
+    tables = map(_rendered, (analyses, *tables_of(results, "closed loop", loop_cells)))
+    return "\n".join(lines) + "\n" + "".join(tables) + _datasets(map(results.group, results.analyses), RESULTS)
 
 
-def _add_datasets(table: Table, group: h5py.Group, meanings: Mapping[str, Meaning]) -> None:
+def _datasets(groups: Iterable[h5py.Group], meanings: Mapping[str, Meaning]) -> str:
+    table = Table("dataset", "shape", "unit", "what")
+
     def add(name: str, item: h5py.Dataset | h5py.Group) -> None:
         if isinstance(item, h5py.Dataset):
             known = meaning(name, meanings) or Meaning("", "")
             table.add_row(item.name, str(item.shape), known.unit, known.what)
 
-    group.visititems(add)
+    for group in groups:
+        group.visititems(add)
+    return _rendered(table)
 
 
 def _rendered(table: Table) -> str:
-    Console(file=(out := StringIO()), width=110).print(table)
+    table.columns[0].no_wrap = True  # names are whole
+    Console(file=(out := StringIO()), width=110).print(table, crop=False)
     return out.getvalue()
 
 
@@ -159,7 +155,10 @@ def print_inspection(file: Path, part: "Inspection", density: float | None, cons
         radius = "–" if face.radius is None else f"{1000 * face.radius:.5g}"
         direction = f"({', '.join(f'{value + 0.0:.4g}' for value in face.direction.round(4))})"
         rows.append((str(k), face.kind, _point(face.center), direction, radius, f"{1e6 * face.area:.5g}"))
-    console.print(plain_table(("face", "kind", "center mm", "normal or axis", "radius mm", "mm² of flat facets"), rows))
+    console.print(
+        plain_table(("face", "kind", "center mm", "normal or axis", "radius mm", "mm² of flat facets"), rows),
+        crop=False,
+    )
     if (more := len(part.faces) - LISTED) > 0:
         console.print(f"and {more} smaller faces")
 
