@@ -47,7 +47,7 @@ def feasibility(results_file: Path, analysis: str | None, catalog: Path | None) 
 
     with reading(results_file):
         if catalog is None:
-            summary_console().print(feasibility_tables(results_file, analysis))
+            summary_console().print(feasibility_tables(results_file, analysis), crop=False)
         else:
             print_motor_choice(results_file, catalog, analysis, summary_console())
 

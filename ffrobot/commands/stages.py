@@ -159,7 +159,7 @@ def _tell(solution: "Solution", path: Path, remarked: int) -> None:
         lines = summary_lines(results.verdict, notes, accuracy, str(path), summary_width(), remarked)
         click.echo("\n".join(lines))
         for table in tables_of(results, "robustness of", robustness_cells):
-            summary_console().print(table)
+            summary_console().print(table, crop=False)
 
 
 @click.command()

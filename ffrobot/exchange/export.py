@@ -200,10 +200,10 @@ def print_import(imported: Imported, console: Console) -> None:
         limits = (f"{joint[key]:.4g}" if key in joint else "–" for key in LIMITS)
         rows.append((joint["name"], joint["type"], span, *limits))
     headers = "joint", "type", "range", "moment or force", "speed", "damping", "friction"
-    console.print(plain_table(headers, rows))
+    console.print(plain_table(headers, rows), crop=False)
     if imported.masses:
         console.print()
-        console.print(plain_table(MASSES, imported.masses))
+        console.print(plain_table(MASSES, imported.masses), crop=False)
         console.out(
             "note       meshes are skins: a filled one has the stiffness of no real casting; links are rigid unless"
             " --flexible names a file",

@@ -32,14 +32,14 @@ def print_details(solution: Solution, results: Results, console: Console) -> Non
     rows = ((name, cells) for name in results.analyses for cells in analysis_cells(results, name))
     shown = ((name, {key: text for key, text in cells.items() if key not in OF_FILE}) for name, cells in rows)
     for table in named_tables("analysis", shown):
-        console.print(table)
+        console.print(table, crop=False)
     for line in _warnings(solution.analyses):
         console.print(f"warning    {line}")
     for line in alike((name, text) for name, result in solution.analyses.items() for text in result.notes):
         console.print(f"note       {line}")
     for table in _tables(solution, results):
         console.print()
-        console.print(table)
+        console.print(table, crop=False)
     console.print()
     for line in results.verdict.lines():
         console.print(line)
@@ -128,8 +128,7 @@ def _stresses(name: str, result: AnalysisResult) -> Iterator[tuple[str, Cells]]:
 
 
 def _chosen_modes(bodies: Sequence[Body], choice: ModeChoice) -> str:
-    kept = [f"{body.name}: {modes_kept(body)}" for body in bodies if body.n_modes]
-    lines = ["; ".join(kept)]
+    lines = ["; ".join(f"{body.name}: {modes_kept(body)}" for body in bodies if body.n_modes)]
     for name, errors in choice.errors.items():
         if any(errors.values()):
             largest = ", ".join(f"{kind} {error:.0e}" for kind, error in errors.items() if error)
@@ -138,13 +137,12 @@ def _chosen_modes(bodies: Sequence[Body], choice: ModeChoice) -> str:
             lines.append(
                 f"{name}: with fewer ({choice.tried[-2]}) results differ by {max(choice.before[name].values()):.0e}"
             )
-    tried = ", ".join(map(str, choice.tried))
     fewer = [f"modes = {body.reduction.lowest} for {body.name}" for body in bodies if body.reduction is not None]
     if fewer:
         lines.append(f"the same without search: {', '.join(fewer)}")
     lines.append(
-        f"solved with {tried} modal coordinates, {choice.seconds:.2f} s before the last; the highest frequency is"
-        f" {choice.highest[0]:.3g} of {choice.highest[1]:.3g} rad/s"
+        f"solved with {', '.join(map(str, choice.tried))} modal coordinates, {choice.seconds:.2f} s before the last;"
+        f" the highest frequency is {choice.highest[0]:.3g} of {choice.highest[1]:.3g} rad/s"
     )
     return "\n".join(lines)
 

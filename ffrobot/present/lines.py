@@ -2,11 +2,13 @@
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import zip_longest
 from typing import TYPE_CHECKING
 
 from ..mbs.quantities.attachment_error import JOLT
 from ..mbs.quantities.validity import largest
 from ..run.result import AnalysisResult, Solution
+from .console import summary_width
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -38,15 +40,24 @@ def folded(lines: Iterable[str]) -> Iterator[str]:
 
 
 def plain_table(headers: Iterable[str], rows: Iterable[Iterable[str]], *, names: int = 2) -> "Table":
-    """Return a table without rules: the first `names` columns are text and wrap, the others are numbers."""
+    """Return a table without rules: the first `names` columns are text and wrap, the others are numbers.
+
+    No word or number is cut: print it with `crop=False`.
+    """
     from rich.table import Table
 
+    rows = list(rows)
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False)
-    for k, header in enumerate(headers):
-        if k < names or header == "integrator":
-            table.add_column(header, overflow="fold")
-        else:
-            table.add_column(header, justify="right", no_wrap=True)
+    width = -2
+    for k, column in enumerate(zip_longest(headers, *rows, fillvalue="")):
+        is_text = k < names or column[0] == "integrator"
+        least = max(map(len, "\n".join(column).split(None if is_text else "\n")), default=0)
+        table.add_column(
+            column[0], justify="left" if is_text else "right", no_wrap=not is_text, overflow="fold", min_width=least
+        )
+        width += least + 2
+    if width > summary_width():
+        table.width = width
     for row in rows:
         table.add_row(*row)
     return table
@@ -68,7 +79,7 @@ def tables_of(
 
 def print_table(console: "Console", headers: Iterable[str], rows: Iterable[Iterable[str]]) -> None:
     """Print `rows` below their headers, and an empty line."""
-    console.print(plain_table(headers, rows))
+    console.print(plain_table(headers, rows), crop=False)
     console.print()
 
 

@@ -254,7 +254,6 @@ def drop_results(sweep: Sweep) -> None:
 
 
 SHOWN = 5  # quantities on the screen
-GAP = 2  # between columns
 
 
 def print_table(sweep: Sweep, rows: Sequence[Row], console: Console) -> None:
@@ -263,7 +262,7 @@ def print_table(sweep: Sweep, rows: Sequence[Row], console: Console) -> None:
     quantities = [name for name in _quantities(rows) if not name.endswith((" steps", " wall_seconds"))]
     shown = [name for name in quantities if name in asked] if asked else quantities[:SHOWN]
     own = ["run", *sweep.keys, "status"]
-    widths = [max([8, *map(len, _broken(header).splitlines())]) + GAP for header in (*own, *shown)]
+    widths = [max([8, *map(len, _broken(header).splitlines())]) + 2 for header in (*own, *shown)]
     while len(shown) > 1 and sum(widths[: len(own) + len(shown)]) > console.width:
         shown = shown[:-1]
     cells = (
@@ -271,7 +270,7 @@ def print_table(sweep: Sweep, rows: Sequence[Row], console: Console) -> None:
          *(f"{row.quantities[name]:.4g}" if name in row.quantities else "" for name in shown))
         for row in rows
     )  # fmt: skip
-    console.print(plain_table(map(_broken, (*own, *shown)), cells, names=1))
+    console.print(plain_table(map(_broken, (*own, *shown)), cells, names=1), crop=False)
     for row in rows:
         if row.status != "completed":
             console.out(f"run {row.number}: {row.status}: {row.message}")

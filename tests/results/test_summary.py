@@ -55,14 +55,14 @@ def verdict(scene):
 
 
 @pytest.mark.parametrize("keys", [PLANAR, SPATIAL], ids=["planar", "3D"])
-def test_planar_and_3d_scenes_have_the_same_details(keys, tmp_path):
+def test_planar_and_3d_scenes_have_the_same_details(keys, tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", width := "40")  # narrower than the table, whose words are whole nevertheless
     solution = solve_scene(make_scene(**keys), Watcher())
     results, printed = Results.from_image(results_image(solution), tmp_path / "x.h5"), StringIO()
-    print_details(solution, results, Console(file=printed, width=200))
+    print_details(solution, results, Console(file=printed, width=int(width)))
     lines = printed.getvalue().splitlines()
     header = next(line for line in lines if line.startswith("analysis"))
-    columns = "analysis kind integrator end (s) steps evaluations tolerance violation wall (s)"
-    assert " ".join(header.split()) == columns
+    assert " ".join(header.split()) == "analysis kind integrator end (s) steps evaluations tolerance violation wall (s)"
     table = {line.split()[0]: line.split() for line in lines if line.startswith(("inverse ", "short "))}
     assert table["inverse"][3] == "0.1"
     assert table["short"][4:6] == ["of", "0.1"]
