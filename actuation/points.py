@@ -89,12 +89,11 @@ class PointSet:
 
     def L_a(self, p: Array) -> Array:
         """Generalized forces (T, 6 + n, c), N, N·m, N/√kg, of 1 N per force at p (T, n), m·√kg; body axes."""
-        e, columns = self.direction, []
-        for k, point in enumerate(self.points):
+        columns = []
+        for e, point in zip(self.direction.T, self.points, strict=True):
             u = point.position + p @ point.translation.T
-            on_frame = np.hstack([np.broadcast_to(e[:, k], u.shape), np.cross(u, e[:, k])])
-            on_modes = np.broadcast_to(point.translation.T @ e[:, k], p.shape)
-            columns.append(np.hstack([on_frame, on_modes]))
+            on_modes = np.broadcast_to(point.translation.T @ e, p.shape)
+            columns.append(np.hstack([np.broadcast_to(e, u.shape), np.cross(u, e), on_modes]))
         return np.stack(columns, axis=2)
 
     def scaled(self, p: Array) -> Array:

@@ -153,7 +153,7 @@ def oriented(part: PartMesh) -> PartMesh:
 
 
 def check_quality(part: PartMesh) -> None:
-    """Raise `InputError`, with how many and where, for cells that are inverted or flat, or have a node twice."""
+    """Raise `InputError`, with how many and where, for cells that are inverted or flat."""
     repeated = (np.diff(np.sort(part.cells)) == 0).any(axis=1)
     _refuse(part, repeated, "elements with a node twice", "elements of distinct nodes")
     determinants = _determinants(part)

@@ -203,10 +203,9 @@ def _problems(body: ModalBody) -> Iterator[str]:
             yield f"{name}: expected a positive number, found {value}"
     if k < 2 or np.any(np.diff(body.stations.position[:, 0]) <= 0):
         yield "stations.position: expected at least two, ascending in x"
-    first, last = body.stations.position[[0, -1], 0]
-    way = (body.interfaces["tip"].position - body.interfaces["root"].position)[0]
-    error = min(abs(body.length - last + first), abs(body.length - way))
-    if not error <= INTERFACE_TOLERANCE * body.length or not first <= body.begin + body.length / 2 <= last:
+    (first, last), end = body.stations.position[[0, -1], 0], body.begin + body.length
+    error = min(abs(end - last), abs(end - body.interfaces["tip"].position[0]))
+    if not error <= INTERFACE_TOLERANCE * body.length or not first <= end - body.length / 2 <= last:
         yield f"length: expected {last - first:g} m, from first to last station, found {body.length} m"
     element = body.stations.element
     if element is not None and not _is_chain(element, k):
@@ -329,11 +328,6 @@ def _expected_shapes(body: ModalBody) -> Iterator[tuple[str, Any, tuple[int, ...
 
 def _is_chain(element: Integers, stations: int) -> bool:
     """Whether the elements (e, 4) cover all intervals between stations, one after the other."""
-    return (
-        element.ndim == 2
-        and element.shape[0] > 0
-        and element.shape[1] == 4
-        and bool(np.all(np.diff(element, axis=1) > 0))
-        and bool(np.all(element[1:, 0] == element[:-1, 3]))
-        and bool(element[0, 0] == 0 and element[-1, 3] == stations - 1)
-    )
+    if element.ndim != 2 or element.shape[1] != 4 or np.any(np.diff(element) <= 0):
+        return False
+    return np.array_equal(np.append(element[:, 0], stations - 1), np.append(0, element[:, 3]))
