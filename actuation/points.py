@@ -216,8 +216,8 @@ def solve_points(chosen: PointSet, run: Run) -> PointForces:
     condition = float((sizes[:, 0] / sizes[:, -1]).max())
     if (space := SPACES[run.model.scene.space]).is_plane:
         F = run.model.tree.places(run.q).frame(run.model.tree.index[chosen.body]).F
-        on_frame = np.einsum("tij,tj->ti", F, unmet[:, :3]), unmet[:, 3:6]
-        unmet = np.column_stack([space.along(on_frame[0]), space.about(on_frame[1]), unmet[:, 6:]])
+        on_frame = np.einsum("tij,tj->ti", F, unmet[:, :3])
+        unmet = np.column_stack([space.along(on_frame), space.about(unmet[:, 3:6]), unmet[:, 6:]])
     return PointForces(force, unmet, residual, rank, condition)
 
 

@@ -59,8 +59,8 @@ def flexibility(body, name, other=None):
     return at.motion / np.diag(body.stiffness) @ load.motion.T
 
 
-def moved(body, x, y=0.0):
-    """The modal body with its points, but not its integrals, away from the origin (m), as of other programs."""
+def moved(body, place):
+    """The modal body with its points, but not its integrals, at `place(x)` in place of x (…, 3), m."""
     parts = {"stations": body.stations} | body.interfaces
-    at = {name: replace(part, position=part.position + np.array([x, y, 0.0])) for name, part in parts.items()}
+    at = {name: replace(part, position=place(part.position)) for name, part in parts.items()}
     return replace(body, stations=at.pop("stations"), interfaces=at)

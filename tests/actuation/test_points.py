@@ -43,7 +43,7 @@ def test_a_body_whose_points_cannot_carry_everything(cantilever):
 
 
 def test_distances_count_from_the_root_wherever_the_origin_is(cantilever):
-    body, away = cantilever(4), moved(cantilever(4), -0.3)
+    body, away = cantilever(4), moved(cantilever(4), lambda x: x - 0.3 * np.eye(3)[0])
     here, there = (chosen(link, axial=(0.2,), transverse=(0.5, "tip")) for link in (body, away))
     for point, other in zip(here.points, there.points, strict=True):
         np.testing.assert_allclose(other.translation, point.translation, atol=1e-12)

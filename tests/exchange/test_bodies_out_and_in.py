@@ -38,21 +38,12 @@ def cloud():
     return dataclasses.replace(body, damping_ratio=np.full(n, 0.02), family=("torsion",) * n)
 
 
-def bent(body):
-    """With nodes on the x axis to the middle, and beside it from there on."""
-
-    def moved(at):
-        beyond = np.maximum(at.position[..., :1] - 0.3, 0.0)
-        return dataclasses.replace(at, position=at.position + beyond * [0.0, 0.2, 0.0])
-
-    interfaces = {name: moved(at) for name, at in body.interfaces.items()}
-    return dataclasses.replace(body, stations=moved(body.stations), interfaces=interfaces)
-
-
 @pytest.fixture(scope="module")
 def bodies():
     made = {name: make_link(link).body for name, link in (("line", LINK), ("loaded", LOADED), ("held", HELD))}
-    return made | {"bent": bent(made["line"]), "cloud": cloud(), "beside": moved(made["line"], -0.2, 0.05)}
+    beside = moved(made["line"], lambda x: x + np.array([-0.2, 0.05, 0.0]))
+    bent = moved(made["line"], lambda x: x + np.maximum(x[..., :1] - 0.3, 0.0) * [0.0, 0.2, 0.0])  # from the middle on
+    return made | {"bent": bent, "cloud": cloud(), "beside": beside}
 
 
 def differences(first, second, keys):

@@ -77,7 +77,7 @@ def test_interpolation_reproduces_cubics(body, coefficients, element):
 
 def test_links_begin_at_their_first_station(body):
     """Also where the origin is elsewhere, as in bodies of other programs, or the root is a face beside the end."""
-    here, away = body.interpolate(0.7), moved(body, 2.0)
+    here, away = body.interpolate(0.7), moved(body, lambda x: x + 2.0 * np.eye(3)[0])
     there = away.interpolate(away.begin + 0.7)
     np.testing.assert_allclose(there.position, np.array([2.7, 0.0, 0.0]), atol=1e-15)
     np.testing.assert_allclose(there.translation, here.translation, rtol=1e-12)

@@ -257,7 +257,7 @@ def modal_body(name: str, integrals: ShapeIntegrals, nodes: Nodes, text: str) ->
     constraint = constraint_modes(omega2, families, interfaces) if condition == CRAIG_BAMPTON else 0
     if condition == CRAIG_BAMPTON and not constraint:
         condition = "cantilever"  # which holds the root alike
-    omega, line, stations = np.sqrt(omega2), _stations_at(ends), _stations(nodes, ends, length)
+    omega, stations = np.sqrt(omega2), _stations(nodes, ends, length)
     if len(stations.position) == len(ends):
         remarks += ("no node lies between root and tip on a line along x: shapes there are cubics of the two",)
     body = ModalBody(
@@ -278,7 +278,7 @@ def modal_body(name: str, integrals: ShapeIntegrals, nodes: Nodes, text: str) ->
         S_bar_kl=S_bar_kl,
         interfaces=interfaces,
         stations=stations,
-        mesh=PictureMesh(line.position, np.array([[0, 1]], dtype=np.int64), line.translation),
+        mesh=PictureMesh(stations.position[[0, -1]], np.array([[0, 1]]), stations.translation[[0, -1]]),
         ffrobot_version=VERSION,
         **sections,  # type: ignore[arg-type]
     )
@@ -318,10 +318,6 @@ def _stations(nodes: Nodes, ends: list[Interface], length: float) -> Stations:
     root, limit = ends[0].position, ON_AXIS * length
     on_axis = [at for at in [*ends, *nodes.values()] if np.abs(at.position - root)[1:].max() <= limit]
     points = sorted(on_axis if on_axis[:2] == ends else ends, key=lambda at: float(at.position[0]))
-    after = [b for a, b in pairwise(points) if b.position[0] - a.position[0] > limit]
-    return _stations_at([points[0], *after])
-
-
-def _stations_at(points: list[Interface]) -> Stations:
+    points = [points[0], *(b for a, b in pairwise(points) if b.position[0] - a.position[0] > limit)]
     position, translation, rotation = (np.array([getattr(at, part) for at in points]) for part in PARTS)
     return Stations(position, translation, rotation, np.zeros(len(points)))
