@@ -83,16 +83,9 @@ def test_messages(given, tmp_path, suffix, old, new, told):
 
 
 DATASETS = (
-    "mass",
-    "second_moment",
-    "invariants/I_bar",
-    "interfaces/tip/rotation",
-    "stations/position",
-    "mesh/points",
-    "modes/frequency",
-    "geometric_stiffness/omega_zz",
-    "length",
-)
+    "mass", "second_moment", "invariants/I_bar", "interfaces/tip/rotation", "stations/position", "mesh/points",
+    "modes/frequency", "geometric_stiffness/omega_zz", "length",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("dataset", DATASETS)

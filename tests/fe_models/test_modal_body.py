@@ -101,30 +101,21 @@ def test_outside_the_body(body, x):
         body.interpolate(x)
 
 
-def test_immutable(body):
-    source = np.array([1.0, 0, 0])
-    held = replace(body, first_moment=source)
-    source[0] = 9.0
-    assert held.first_moment[0] == 1.0
-    for array in (body.S_bar, body.stations.translation, body.interfaces["tip"].rotation, body.mesh.points):
-        with pytest.raises(ValueError, match="read-only"):
-            array[...] = 0.0
-    with pytest.raises(FrozenInstanceError):
-        body.mass = 1.0
-    with pytest.raises(TypeError):
-        body.interfaces["grip"] = body.interfaces["tip"]
-
-
-@pytest.mark.parametrize("copied", [copy.deepcopy, lambda body: pickle.loads(pickle.dumps(body))])
-def test_copies_are_whole_and_immutable(copied, body):
+@pytest.mark.parametrize("copied", [replace, copy.deepcopy, lambda body: pickle.loads(pickle.dumps(body))])
+def test_bodies_and_copies_are_whole_and_immutable(copied, body):
     """As other processes get them."""
-    other = copied(body)
+    source = np.array([1.0, 0, 0])
+    other = copied(replace(body, first_moment=source))
+    source[0] = 9.0
+    assert other.first_moment[0] == 1.0
     assert vars(other).keys() == vars(body).keys()
     assert list(other.interfaces) == list(body.interfaces)
     np.testing.assert_array_equal(other.interfaces["tip"].rotation, body.interfaces["tip"].rotation)
-    np.testing.assert_array_equal(other.S_bar, body.S_bar)
-    with pytest.raises(ValueError, match="read-only"):
-        other.S_bar[...] = 0.0
+    for array in (other.S_bar, other.stations.translation, other.interfaces["tip"].rotation, other.mesh.points):
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0.0
+    with pytest.raises(FrozenInstanceError):
+        other.mass = 1.0
     with pytest.raises(TypeError):
         other.interfaces["grip"] = other.interfaces["tip"]
 
