@@ -75,7 +75,7 @@ def test_there_and_back(file_format, name, bodies):
     np.testing.assert_array_equal(back.stations.position[[0, -1]], ends)
     has_line = name not in ("bent", "cloud")
     assert len(back.stations.position) == (len(body.stations.position) if has_line else 2)
-    assert has_line != any("shapes there are cubics of the two" in line for line in remarks)
+    assert has_line != any("between root and tip are cubics" in line for line in remarks)
     assert back.reference_condition == body.reference_condition
     assert any("geometric stiffness" in line for line in left_out)
     assert any("not in the file" in line for line in remarks)

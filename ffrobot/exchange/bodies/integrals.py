@@ -259,7 +259,7 @@ def modal_body(name: str, integrals: ShapeIntegrals, nodes: Nodes, text: str) ->
         condition = "cantilever"  # which holds the root alike
     omega, stations = np.sqrt(omega2), _stations(nodes, ends, length)
     if len(stations.position) == len(ends):
-        remarks += ("no node lies between root and tip on a line along x: shapes there are cubics of the two",)
+        remarks += ("shapes between root and tip are cubics: no node lies on a line along x",)
     body = ModalBody(
         name=name,
         kind="beam" if sections["J_spin"] else "solid",
