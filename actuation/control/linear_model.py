@@ -238,14 +238,14 @@ def save_arrays(arrays: Mapping[str, Any], path: Path) -> None:
 
 
 def read_arrays(path: Path, names: Sequence[str]) -> list[Array]:
-    """Read matrices, any unit, of a .npz or .mat file by name. Raises `InputError` if it is unreadable or lacks one."""
+    """Read real matrices, any unit, of a .npz or .mat file by name. Raises `InputError` for a file without them."""
     try:
-        if path.suffix == ".mat":
-            held: Mapping[str, Any] = scipy.io.loadmat(path)
-        else:
-            held = np.load(path)
-        return [np.atleast_2d(np.asarray(held[name], dtype=float)) for name in names]
-    except (OSError, ValueError, KeyError, NotImplementedError) as error:
+        held: Mapping[str, Any] = scipy.io.loadmat(path) if path.suffix == ".mat" else np.load(path)
+        arrays = [np.atleast_2d(held[name]) for name in names]
+        if not all(np.isrealobj(array) and np.isfinite(array).all() for array in arrays):
+            raise ValueError("complex or infinite numbers")
+        return [array.astype(float) for array in arrays]
+    except Exception as error:  # whatever SciPy and NumPy find in a file that is none
         raise InputError(f"{path}: expected a .npz or .mat file with {quoted(names)}, found: {error}") from None
 
 

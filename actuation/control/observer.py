@@ -196,8 +196,8 @@ def given(record: GainsObserver, setup: Setup) -> Observer:
                 f"{of.shape[0]} × {of.shape[1]}",
             )
     scale = np.array(record.scale or (1.0,) * p)
-    if len(scale) != p:
-        raise InputError(f"expected {p} numbers as scale, one of each output", len(scale))
+    if len(scale) != p or not scale.all():
+        raise InputError(f"expected {p} numbers other than 0 as scale, one of each output", f"{scale}")
     rows, columns = setup.columns(*record.outputs), setup.places(*record.inputs)
     C_all, M = np.zeros((len(setup.outputs), n)), np.zeros((n, len(setup.outputs)))
     B_all = np.zeros((n, len(setup.inputs)))

@@ -127,7 +127,14 @@ def _even(rows: Any) -> Any:
     return rows
 
 
+def _different(names: tuple[str, ...]) -> tuple[str, ...]:
+    if len({*names}) < len(names):
+        raise ValueError(f"expected each name once, found {quoted(names)}")
+    return names
+
+
 Matrix = Annotated[tuple[tuple[float, ...], ...], AfterValidator(_even)]
+Names = Annotated[tuple[str, ...], AfterValidator(_different)]
 
 
 class ObserverRecord(Record):
@@ -206,9 +213,9 @@ class GainsObserver(ObserverRecord):
     """
 
     kind: Literal["gains"]
-    inputs: tuple[str, ...]
+    inputs: Names
     """Commands u, as `control/` in the results names them."""
-    outputs: Annotated[tuple[str, ...], NotEmpty]
+    outputs: Annotated[Names, NotEmpty]
     """Readings y, as `control/` in the results names them."""
     A: Matrix | None = None
     """(states, states), from sample to sample."""
@@ -365,7 +372,7 @@ class StateFeedback(ControllerRecord):
     """u = −K x̂ with the states of an observer of kind "gains"."""
 
     kind: Literal["state-feedback"]
-    inputs: Annotated[tuple[str, ...], NotEmpty]
+    inputs: Annotated[Names, NotEmpty]
     """Commands, as `control/` in the results names them, such as "joint/NAME" or "pzt/LAYOUT/1"."""
     gain: Matrix
     """K (inputs, states), in the unit of each command per unit of each state."""

@@ -166,6 +166,8 @@ def test_a_scheduled_controller_is_a_table_of_systems(tmp_path):
         ({"observer": {"kind": "gains", "inputs": [], "outputs": ["joint/O"], "A": [[0.5]]}}, "B.*missing"),
         ({"sensor": [ENCODER], "observer": GAINS | {"B": [[1.0, 2.0]]}}, "expected B with 1 × 1"),
         ({"sensor": [ENCODER], "observer": GAINS | {"A": [[1.5]]}}, "below 1 in size, found 1.4"),
+        ({"sensor": [ENCODER], "observer": GAINS | {"inputs": ["joint/O", "joint/O"]}}, "expected each name once"),
+        ({"sensor": [ENCODER], "observer": GAINS | {"scale": [0.0]}}, "1 numbers other than 0 as scale"),
         ({"sensor": [ENCODER], "observer": GAINS | {"A": [[0.5], [0.0, 0.5]]}}, "lists of equal length"),
         ({"sensor": [ENCODER | {"noise": 1e-30}], "observer": KALMAN}, "far more exact than `process` moves the robot"),
         ({"controller": [{"kind": "lqr", "inputs": "patches"}]}, "expected motors or patches as inputs"),
