@@ -37,7 +37,7 @@ class Column(NamedTuple):
     frequency: Array
     values: ComplexArray
     coherence: Array | None
-    order: int | None = None  # of the time derivative: 0 receptance, 1 mobility, 2 accelerance
+    order: int | None = None  # of the time derivative, see `UNITS`
     is_si: bool = False  # whether label and dataset 164, if any, are SI's
 
 
@@ -79,9 +79,9 @@ def _universal(path: Path) -> Iterator[Column]:
                 f"node {at[2]}: expected displacement, velocity or acceleration (data types 8, 11, 12) per force (13)",
                 f"types {kind} and {by}",
             )
-        force, response = (f"{node:g}/{_axis(axis)}" for node, axis in (at[:2], at[2:]))
-        label = str(one["ordinate_axis_units_lab"]).strip().lower()
-        is_si = is_of_si and label in ("", "none", *LABELS[ORDERS[kind]])
+        force, response = (f"{node:.0f}/{_axis(axis)}" for node, axis in (at[:2], at[2:]))
+        labels = {str(one[f"{of}_axis_units_lab"]).strip().lower() for of in ("ordinate", "orddenom")}
+        is_si = is_of_si and labels <= {"", "none", "n", *LABELS[ORDERS[kind]]}
         frequency, values = np.asarray(one["x"], float), one["data"].astype(complex)
         yield Column(force, response, frequency, values, coherence.get(at), order=ORDERS[kind], is_si=is_si)
 
@@ -267,7 +267,8 @@ def _read(path: Path, test: ResponseTest) -> MeasuredPose:
     responses = []
     for column in columns:
         with naming(f"{test.file}: {column.force} → {column.response}"):
-            if len(column.frequency) != len(frequency) or not np.allclose(column.frequency, frequency, rtol=1e-9):
+            sizes = {len(of) for of in (frequency, column.frequency, column.coherence) if of is not None}
+            if len(sizes) > 1 or not np.allclose(column.frequency, frequency, rtol=1e-9):
                 raise InputError("expected the frequencies of the other functions", "others")
             _check(column, inside)
             responses.append(_response(test, column, inside))

@@ -240,10 +240,12 @@ def universal(path, H, lines, ends, kind=12, **keys):
         "type": 58, "func_type": 4, "load_case_id": 0, "abscissa_spec_data_type": 18, "ordinate_spec_data_type": kind,
         "orddenom_spec_data_type": 13, "binary": 0, "abscissa_axis_lab": "Frequency", "id1": "hammer",
     }  # fmt: skip
-    sets = []
+    sets, half = [], keys.pop("coherence", 0)
     for (force, response), h in zip(ends, H.T, strict=True):
         nodes = {"ref_node": force[0], "ref_dir": force[1], "rsp_node": response[0], "rsp_dir": response[1]}
         sets.append(data | nodes | {"x": lines, "data": h} | keys)
+    if half:
+        sets.append(sets[-1] | {"func_type": 6, "x": lines[:half], "data": np.full(half, 0.9)})
     if length := keys.get("length"):
         sets.insert(0, {"type": 164, "units_code": 9, "length": length, "force": 1.0, "temp": 1.0, "temp_offset": 0.0})
     pyuff.UFF(str(path)).write_sets(sets, mode="overwrite")
@@ -276,12 +278,14 @@ BAD = {
     "UFF of strains": ({"kind": 3}, {}, r"data types 8, 11, 12\) per force \(13\), found types 3 and 13"),
     "UFF of rotations": ({"axis": 4}, {}, "expected translations .*, found 4"),
     "UFF in g": ({"ordinate_axis_units_lab": "g"}, {}, "expected the key unit of the test"),
+    "UFF per lbf": ({"orddenom_axis_units_lab": "lbf"}, {}, "expected the key unit of the test"),
+    "half a coherence": ({"coherence": 10}, {}, "expected the frequencies of the other functions"),
     "UFF in mm": ({"length": 1000.0}, {}, "expected the key unit of the test"),
     "another quantity": ({}, {"unit": "m/N"}, 'unit: expected that of the file, "m/s²/N", .* or "g/N", found "m/N"'),
     "an unknown unit": ({}, {"unit": "ft/s²/lbf"}, 'unit: expected "m/N"'),
     "frequency 0": ({"first": 0.0}, {}, "expected frequencies above 0 Hz, found 0: the key band"),
     "no frequency": ({}, {"band": [900.0, 950.0]}, "band: expected frequencies of the file within it"),
-    "a node without a point": ({"node": 7}, {}, 'points: expected the point of the robot for "7"'),
+    "a node without a point": ({"node": 1000007}, {}, 'points: expected the point of the robot for "1000007"'),
     "averages alone": ({}, {"averages": 5}, "averages: expected them with a coherence"),
 }
 
