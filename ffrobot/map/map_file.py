@@ -28,9 +28,14 @@ UNITS = {
     "torque": "N·m or N",
     "best_turn": "rad",
     "best_turn_depth": "m",
-} | dict.fromkeys(
-    ("sag", "place", "robot", "milling_depth", "milling_best_depth", "milling_lobes", "milling_deviation"), "m"
-)
+    "sag": "m",
+    "place": "m",
+    "robot": "m",
+    "milling_depth": "m",
+    "milling_best_depth": "m",
+    "milling_lobes": "m",
+    "milling_deviation": "m",
+}
 NOT_IN_TABLE = ("compliance", "response", "robot", "milling_lobes")
 
 
