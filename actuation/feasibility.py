@@ -290,7 +290,7 @@ def _remedies(
         missing, least = np.inf, np.abs(patches.amplifiers.range).min()
         for number in range(patches.served, 200):
             if (voltage := with_count(number)) is None:
-                break
+                continue
             most, missing = number, voltage / least
             if missing <= 1.0:
                 count = number

@@ -219,6 +219,7 @@ def _strains(body: ModalBody, x: Array) -> Array:
     return (potentials(body, x + h) - potentials(body, x - h)) / (2 * h)[:, None, None]
 
 
+ROUND_OFF = 1e-12  # of c times the largest rotation in a mode, of a modal force per volt
 STEP = 0.1  # of the extent, from one station to the next; less is a taper
 
 
@@ -249,6 +250,9 @@ def effects(placed: Sequence[PlacedLayout], body: ModalBody) -> list[Effects]:
         layers = layers_on_link(placed, body)
         Phi_V -= (layers.straight - layers.by_volts).T @ layers.B
         C += np.outer(opened, opened) * layers.yielding
+    turns = np.abs(body.stations.rotation).max(axis=(0, 1))
+    loads = np.concatenate([one.per_volt for one in found])
+    Phi_V *= np.abs(Phi_V) > ROUND_OFF * np.abs(np.outer(loads, turns))
     ends = np.cumsum([len(one.edges) for one in placed])[:-1]
     parts = zip(found, np.split(Phi_V, ends), np.split(C, ends), strict=True)
     return [one._replace(Phi_V=per_volt, capacitance=c) for one, per_volt, c in parts]

@@ -38,6 +38,9 @@ def test_modes_that_no_patch_reaches_are_named():
     check_reach(of_link)
     round_off = replace(of_link.reach, Phi_V=np.diag([1.0, 1.0, 1.0, 1e-14]))
     np.testing.assert_allclose(voltage_gain(round_off), np.diag([1.0, 1.0, 1.0, 0.0]), atol=1e-12)
+    second = {"indices": [2], "family": "in-plane-bending", "attachment_modes": False}
+    with pytest.raises(InputError, match="expected eigenmodes of the link that patches"):
+        on_link(modal_body(paper_link("simply-supported") | {"modes": second}), centers=(0.5,), d31=-110e-12)
 
 
 def test_patches_that_only_bend_leave_axial_modes_as_they_are(all_modes):
@@ -98,14 +101,14 @@ def test_patches_on_a_taper_bend_with_the_local_lever_arm(cantilever):
 def test_a_step_of_more_than_a_tenth_under_a_patch_is_refused(cantilever):
     body = cantilever(4)
     x = body.stations.position[:, 0]
-    for factor, fine in ((1.05, True), (1.2, False)):
-        stepped = replace(body, stations=replace(body.stations, height=np.where(x < 0.5, 0.015, 0.015 * factor)))
-        patches(stepped, centers=(0.3, 0.7))
-        if fine:
-            patches(stepped, centers=(0.5,))
-            continue
-        with pytest.raises(InputError, match=r"across a step of the height from 0\.015 to 0\.018 m at 0\.5 m"):
-            patches(stepped, centers=(0.5,))
+    fine, coarse = (
+        replace(body, stations=replace(body.stations, height=np.where(x < 0.5, 0.015, 0.015 * factor)))
+        for factor in (1.05, 1.2)
+    )
+    patches(fine, centers=(0.3, 0.5, 0.7))
+    patches(coarse, centers=(0.3, 0.7))
+    with pytest.raises(InputError, match=r"across a step of the height from 0\.015 to 0\.018 m at 0\.5 m"):
+        patches(coarse, centers=(0.5,))
 
 
 def outlined(body, faces=("top", "bottom"), width=0.025, count=10):
