@@ -42,10 +42,10 @@ def voltage_cells(results: Results, analysis: str) -> Iterator[Cells]:
         limits = np.atleast_1d(about["limit"])  # one for all patches, or one each
         is_limited = np.isfinite(limits).any()
         span = " to ".join(dict.fromkeys((f"{limits.min():g}", f"{limits.max():g}")))
-        ratio, judged = np.max(required / limits), f"{analysis}/feasibility/pzt/{layout}/factor"
+        ratio = np.max(required / limits)
         if "range" in about:
             span = f"{about['range'][0].max():g} to {about['range'][1].min():g}"
-            ratio = np.max(results[judged]) if results.has(judged) else ratio
+            ratio = max(ratio, np.max(results[f"{group}/required_voltage"][:, None] / about["range"]))
         yield {
             "on": layout,
             "largest (V)": volts(required.max()),
