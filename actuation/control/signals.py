@@ -171,7 +171,7 @@ def _of_sensor(model: Model, context: ActuatedContext, sensor: Sensor, whole: Wh
         tree, at, of = (model if whole is None else whole.model).tree, points[place], context.patches.get(link)
         body = tree.nodes[tree.index[link]].body
         row = at.strain[0] @ body.modal_transform
-        is_beside = of is not None and bool((np.prod(of.edges - at.position[0], axis=1) > 0.0).all())
+        is_beside = of is not None and of.is_beside(at.position)
         if is_beside:  # modes bend here, too, where patches do
             row = np.linalg.solve(context.links[link].stiffness, at.strain[0]) @ body.on_file.T * body.stiffness
         along = row @ coordinates

@@ -138,6 +138,10 @@ class LinkPatches:
                 found.append((self.columns(label).start + which, PlacedLayout(array.layout, edges[which])))
         return found
 
+    def is_beside(self, place: Array) -> bool:
+        """Whether `place` (3,), m, is at a section of the link without patches."""
+        return bool((np.prod(self.edges - place[0], axis=1) > 0.0).all())
+
     def columns(self, layout: str) -> slice:
         """The columns of one layout among the k patches."""
         ends = np.cumsum([len(array.edges) for array in self.arrays.values()])

@@ -253,6 +253,12 @@ class AnalysisResult:
             texts += path_warnings(run.analysis, run.time, run.model.scene.trajectory)
         if self.actuation is not None and (missed := self.actuation.feasibility.unsupplied) is not None:
             texts.append(missed.in_words)
+        for gauge in filter(None, (sensor.strain for sensor in getattr(self.analysis, "sensor", ()))):
+            link, _, point = gauge.partition(".")
+            patched, place = self.prepared.patches.get(link), self.prepared.links[link].stress[point].position
+            if patched is not None and (link in self.prepared.divided or not patched.is_beside(place)):
+                where = "below a patch or on a subdivided link with patches a gauge"
+                texts.append(f'strain "{gauge}": {where} reads the strain of modes alone, tens of percent off')
         return tuple(texts)
 
     @cached_property

@@ -124,12 +124,15 @@ def test_slow_charges_and_readings_by_any_number_of_modes(strip, structural):
     """q = C V + c² l V/EI of a pair alone, read without C V; gauges and pairs beside it read loads alone."""
     of_body, far = {"count": 2} | strip, 0.2
     modes = {"count": of_body.pop("count"), "family": "in-plane-bending"}
-    link = LINK | {"modes": modes, "stress": {"points": {"gauge": [0.14, -H / 2, 0.0]}}}
-    seen = {"name": "seen", "kind": "linear", "sensor": [{"pzt": "strip"}, {"strain": "strip.gauge"}]}
+    link = LINK | {"modes": modes, "stress": {"points": {"gauge": [0.14, -H / 2, 0.0], "under": [0.2, -H / 2, 0.0]}}}
+    gauges = [{"strain": "strip.gauge"}, {"strain": "strip.under"}]
+    seen = {"name": "seen", "kind": "linear", "sensor": [{"pzt": "strip"}, *gauges]}
     pairs = [PATCH | {"centers": [0.06, far], "length": 0.1, "structural": ["stiffness"] if structural else False}]
     scene = one_link("strip", link, seen, body=[{"name": "strip", "link": link} | of_body], pzt=pairs)
     names = [*(f"pzt/strip/{k}" for k in (1, 2)), "strain/strip.gauge"]
-    model = ffrobot.solve(scene).linear("seen")[0]
+    model = (results := ffrobot.solve(scene)).linear("seen")[0]
+    doubtful = [text.split('"')[1] for text in results.attributes("seen")["warnings"]]
+    assert doubtful == ["strip.gauge", "strip.under"]["pieces" not in strip :]
     by_volt, by_force = (
         model.frequency_response(1e-3 * np.ones(1), of, names)[0, :, 0] for of in (names[0], "force/strip.tip/y")
     )
