@@ -13,7 +13,7 @@ Otherwise runs differ by their tolerance. The first gradient of a search then ta
 correct later one-sided ones. Derivatives of peaks are those at their own time (envelope theorem).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -194,6 +194,7 @@ class Differentiation:
             self.repeats = bool(np.all(left <= DOUBTFUL * change + ROUND_OFF * np.abs(own)))
             for j, beside in samples.items():
                 slopes.error[:, j] += left / abs(next(iter(beside)))
+            slopes = replace(slopes, kinks=slopes.kinks or self._kinks([whole]))
         return slopes
 
     def _samples(
@@ -239,15 +240,17 @@ class Differentiation:
                 bent = 0.5 * np.nan_to_num(curvature[:, j]) * x[1]
                 slope, uncertain = slope - bent, uncertain + np.abs(bent)
             gradient[:, j], error[:, j] = slope, uncertain
-        responses = self.evaluations.problem.responses
-        kinks = dict.fromkeys(
+        kinks = self._kinks(values for beside in samples.values() for values in beside.values())
+        return Slopes(gradient, error, kinks)
+
+    def _kinks(self, beside: Iterable[Sequence[Reading]]) -> tuple[str, ...]:
+        texts = dict.fromkeys(
             f"{response.text}: close to this design another peak is the largest, {one.elsewhere}"
-            for beside in samples.values()
-            for values in beside.values()
-            for response, one in zip(responses, values, strict=True)
+            for values in beside
+            for response, one in zip(self.evaluations.problem.responses, values, strict=False)
             if one.elsewhere
         )
-        return Slopes(gradient, error, tuple(kinks))
+        return tuple(texts)
 
 
 ACTIVE = 1e-4  # of a limit, or of a number's range: nearer ones count as reached
