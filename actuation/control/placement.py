@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ...common.arrays import Array, Indices, in_parts
-from ...common.errors import InputError, quoted
+from ...common.errors import InputError, naming, quoted
 from ...common.libraries import scipy
 from ...common.structs import struct
 from ...common.validation import Record
@@ -400,10 +400,8 @@ def _deviation(
             known, C=np.vstack([known.C, C]), D=np.vstack([known.D, np.zeros((len(C), known.D.shape[1]))]),
             output_names=(*known.output_names, *(patch.name for patch in patches)),
         )  # fmt: skip
-        try:
+        with naming(key):
             found = kalman(record, model, [*read, *patches], [s.name for s in wanted], ((), record.sample_time, 0.0))
-        except InputError as error:
-            raise InputError(f"{key}: {error}") from None
         of_tip = found.E[: len(wanted)]
         return float(np.sqrt(np.trace(of_tip @ found.covariance @ of_tip.T)))
 

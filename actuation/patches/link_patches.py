@@ -25,12 +25,12 @@ from .patches import (
     Reach,
     ReachedModes,
     Voltages,
-    allocation,
     check_edges,
     patch_edges,
     reached_modes,
     served_first,
-    solve_voltages,
+    voltage_gain,
+    voltage_scale,
     weights,
 )
 from .records import PztLayout
@@ -75,8 +75,9 @@ class LinkPatches:
 
     def voltages(self, F_p: Array) -> dict[str, Voltages]:
         """Voltages by layout for modal forces F_p (T, n), N/√kg; their `unmet`: what all layouts together leave."""
-        found = solve_voltages(self.reach, self.reach.modes.forces(F_p))
-        return self._by_layout(found.required, found.within_limit, F_p)
+        forces = np.ascontiguousarray(self.reach.modes.forces(F_p))
+        within = self.allocation(limited=True).solve(forces)
+        return self._by_layout(forces @ voltage_gain(self.reach).T, within, F_p)
 
     @property
     def amplifiers(self) -> Amplifiers:
@@ -123,7 +124,9 @@ class LinkPatches:
 
     def allocation(self, *, limited: bool) -> _core.Allocation:
         """The map from forces (m,) on the modes of `reach`, N/√kg, to voltages (k,), V, limited or not."""
-        return allocation(self.reach, limited=limited)
+        of = self.reach
+        lower, upper = (of.amplifiers if limited else of.amplifiers.unlimited()).range
+        return _core.Allocation(of.Phi_V, of.W_sqrt, voltage_gain(of), lower, upper, voltage_scale(of))
 
     def placed_on(self, start: float, length: float) -> list[tuple[Indices, PlacedLayout]]:
         """Return, by layout, indices (k,) of its patches on a piece of the link, and their position there.

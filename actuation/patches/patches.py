@@ -11,7 +11,6 @@ from ...common.errors import InputError
 from ...common.structs import struct
 from ...fe_models.link_records.families import Family
 from ...fe_models.modal_body import ModalBody
-from ...mbs import _core
 from ...mbs.model.amplifiers import Amplifiers
 from ...mbs.model.body import Body
 from ...mbs.model.masses import uncoupling
@@ -182,20 +181,6 @@ def voltage_gain(patches: Reach) -> Array:
     W_sqrt = served_first(served, n, k) if patches.serves_all else patches.W_sqrt
     scale = voltage_scale(patches)
     return scale[:, None] * np.linalg.pinv(W_sqrt @ patches.Phi_V * scale, 1 / SINGULAR) @ W_sqrt
-
-
-def allocation(patches: Reach, *, limited: bool) -> _core.Allocation:
-    """The map from modal forces (n,), N/√kg, to voltages (k,), V, with limits of the patches or without."""
-    lower, upper = (patches.amplifiers if limited else patches.amplifiers.unlimited()).range
-    return _core.Allocation(patches.Phi_V, patches.W_sqrt, voltage_gain(patches), lower, upper, voltage_scale(patches))
-
-
-def solve_voltages(patches: Reach, F_p: Array) -> Voltages:
-    """Find voltages (T, k), V, that produce the modal forces F_p (T, n), N/√kg, as nearly as possible."""
-    F_p = np.ascontiguousarray(F_p)
-    required = F_p @ voltage_gain(patches).T
-    within_limit = allocation(patches, limited=True).solve(F_p)
-    return Voltages(required, within_limit, F_p - within_limit @ patches.Phi_V.T, patches.served)
 
 
 @struct
