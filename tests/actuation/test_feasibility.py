@@ -55,8 +55,7 @@ def test_patches_peak_by_peak():
     for k, since in enumerate(judged.saturation_time):
         beyond = t[np.abs(volts[:, k]) > 3000.0]
         assert beyond[0] == since if beyond.size else np.isnan(since)
-    assert np.any(np.isnan(judged.saturation_time))
-    assert not np.all(np.isnan(judged.saturation_time))
+    assert 0 < np.count_nonzero(np.isnan(judged.saturation_time)) < 10
     peaks = np.abs(F_p).max(axis=0)
     np.testing.assert_allclose(judged.mode_required, peaks, rtol=1e-9, atol=1e-9 * peaks.max())
     np.testing.assert_allclose(judged.mode_available, np.abs(Phi_V).sum(axis=1) * 3000.0, rtol=1e-9)
@@ -175,12 +174,8 @@ def test_predicted_shift_of_the_tip_is_what_happens():
 
 def test_rms_and_shares_of_time_by_hand():
     """τ = m g L/2 + J θ̈ at θ ≈ 0 over whole periods; speed 0.2 |cos 2t| against a limit of 0.1: beyond for 2/3."""
-    solution = arm(
-        STRAIGHT | {"end": np.pi, "output_step": np.pi / 2000},
-        target="1e-3*sin(2*t)",
-        motor={"speed_limit": 1e-3},
-    )
-    motor = judged_of(solution).motors["O"]
+    periods = STRAIGHT | {"end": np.pi, "output_step": np.pi / 2000}
+    motor = judged_of(arm(periods, "1e-3*sin(2*t)", motor={"speed_limit": 1e-3})).motors["O"]
     m = 7850.0 * 0.025 * 0.015
     swing = m / 3 * 4e-3  # amplitude of J θ̈; the weight's moment changes by θ²/2 only
     assert motor.rms_moment == pytest.approx(np.hypot(m * 9.81 / 2, swing / np.sqrt(2)), rel=1e-6)
@@ -188,16 +183,10 @@ def test_rms_and_shares_of_time_by_hand():
     assert not motor.has_spike
 
 
-@pytest.mark.parametrize(
-    ("value", "jump"),
-    [
-        ("0.1*t**2", "acceleration"),  # from rest at t = 0 with 0.2 rad/s² at once
-        ("0.1*sin(2*t)**2*t**2", ""),
-    ],
-)
-def test_jump_of_a_path_is_seen(value, jump):
-    result = arm(target=value).analyses["motion"]
-    assert path_jump(result.run, 0) == jump
+def test_jump_of_a_path_is_seen():
+    """From rest at t = 0 with 0.2 rad/s² at once, or smoothly."""
+    for value, jump in (("0.1*t**2", "acceleration"), ("0.1*sin(2*t)**2*t**2", "")):
+        assert path_jump(arm(target=value).analyses["motion"].run, 0) == jump
 
 
 def test_short_peaks_of_motors_only_are_laid_to_the_jerk():
