@@ -10,7 +10,7 @@ import numpy as np
 
 from ..common.arrays import Array, NDArray
 from ..common.checksum import MARK, METHOD, sealed
-from ..common.errors import InputError
+from ..common.errors import InputError, naming
 from ..common.files import AnyPath, write_atomically
 from ..common.hdf5 import fields_in, image_of, in_memory, numbers, open_checked, read
 from ..common.meanings import write_record
@@ -116,11 +116,9 @@ def _read(path: Path, reader: Callable[[h5py.File], Found]) -> Found:
     if not path.is_file():
         raise InputError(f"{path}: modal body file not found")
     try:
-        with open_checked(path) as file:
-            _check_format(path, file.attrs)
+        with naming(path), open_checked(path) as file:
+            _check_format(file.attrs)
             return reader(file)
-    except InputError as error:
-        raise InputError(str(error) if str(error).startswith(f"{path}:") else f"{path}: {error}") from None
     except KeyError as error:
         raise InputError(f"{path}: damaged modal body file: {error.args[0]}") from error
     except MemoryError:
@@ -138,15 +136,15 @@ def is_modal_body_file(path: Path) -> bool:
         return False
 
 
-def _check_format(path: Path, attributes: h5py.AttributeManager) -> None:
+def _check_format(attributes: h5py.AttributeManager) -> None:
     if attributes.get("format") != FORMAT:
-        raise InputError(f'{path}: expected format "{FORMAT}"', f"{attributes.get('format', 'no such attribute')!r}")
+        raise InputError(f'expected format "{FORMAT}"', f"{attributes.get('format', 'no such attribute')!r}")
     version = attributes["format_version"]
     if not isinstance(version, int | np.integer) or version < 1:
-        raise InputError(f"{path}: format_version: expected a whole number", f"{version!r}")
+        raise InputError("format_version: expected a whole number", f"{version!r}")
     if version > FORMAT_VERSION:
         raise InputError(
-            f"{path}: written by a newer ffrobot ({attributes.get('ffrobot_version', 'unknown')}): format_version:"
+            f"written by a newer ffrobot ({attributes.get('ffrobot_version', 'unknown')}): format_version:"
             f" expected at most {FORMAT_VERSION}",
             version,
         )

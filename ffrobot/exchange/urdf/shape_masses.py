@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...common.arrays import Array
-from ...common.errors import InputError
+from ...common.errors import InputError, naming
 from ...common.rotations import rpy_of, smallest_turn
 from ...common.structs import struct
 from ...common.tables import shown
@@ -219,11 +219,10 @@ def _of_mesh(shape: MeshFile, urdf: Path, density: float, label: str) -> tuple[I
             f"no file {shown(shape.filename)}; --radius takes cylinders where there are no meshes",
         )
     try:
-        mesh = _loaded(shape, urdf)
+        with naming(label):
+            mesh = _loaded(shape, urdf)
     except ModuleNotFoundError:
         raise InputError(f"{label}: masses of meshes need trimesh: pip install trimesh pycollada") from None
-    except InputError as error:
-        raise InputError(f"{label}: {error}") from error.__cause__
     is_closed = _is_closed(mesh)
     try:
         solid = mesh if is_closed else mesh.convex_hull
