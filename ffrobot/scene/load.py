@@ -152,6 +152,10 @@ def problems(scene: SceneKeys) -> Iterator[str]:
     yield from _guess_problems(scene)
     yield from _load_problems(scene)
     yield from _stiffening_problems(scene)
+    driven = {joint.name for joint in scene.motor_joints}
+    for joint in scene.joint:
+        if getattr(joint, "stiffness", None) is not None and joint.name not in driven:
+            yield f"{joint.label}: stiffness: expected a joint with a motor (in loops motor = true), found one without"
     for k, analysis in enumerate(scene.analysis):
         among = Surroundings(scene.analysis[:k], scene.analysis[k:], KINDS.records)
         for problem in (*_unmet_needs(scene, analysis), *analysis.problems(among)):

@@ -19,15 +19,7 @@ from .tree import CompliantGear, KinematicTree
 
 
 def elastic_joints(model: Model) -> list[Node]:
-    """The bodies whose inboard joints have compliant gears, in the order of the tree.
-
-    Raises `InputError` for such a gear in a joint without a motor.
-    """
-    for joint in model.scene.joint:
-        if getattr(joint, "stiffness", None) is not None and joint.name not in model.motors:
-            raise InputError(
-                f"{model.scene.path}: {joint.label}: stiffness: expected a joint with a motor", "one without"
-            )
+    """The bodies whose inboard joints have compliant gears, in the order of the tree."""
     return [node for node in model.tree.nodes if compliance(node) is not None]
 
 
