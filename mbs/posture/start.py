@@ -8,6 +8,7 @@ import numpy as np
 
 from ...common.arrays import Array, Booleans, Indices
 from ...common.errors import InputError, quoted
+from ...common.rotations import exponential, logarithm
 from ...common.toml_files import toml_line
 from ..model.known_motion import State, mass_matrices
 from ..model.model import MET, Model
@@ -129,14 +130,20 @@ def displaced_joints(model: Model, start: State, joints: Container[str] | None =
     if not model.loop_rows.any():
         return
     initial, scales = model.scene.initial, model.joint_sizes
-    guess = State(model.tree.at_rest(_numbers(model, initial.joints, "joints")), _guessed_rates(model))
+    vectors, given = (_numbers(model, getattr(initial, key), key) for key in ("joints", "joint_rates"))
+    guess = State(model.tree.at_rest(vectors), _guessed_rates(model))
     fastest = float(np.abs(guess.v / np.where(scales > 0, scales, np.inf)).max(initial=0.0))
     q, v, nodes = start.q - guess.q, start.v - guess.v, (node for node in model.tree.nodes if node.joint.units)
     off = [(node.joint.name, q[node.q], v[node.v], scales[node.v]) for node in nodes]
-    given = _numbers(model, initial.joint_rates, "joint_rates")
     for one, at in zip(model.cut, model.along_cut.motions(start.q[None], start.v[None], np.zeros(1)), strict=True):
         name, size = one.joint.name, np.array(1.0 if one.row.kind == "turn" else model.size)
         off.append((name, at.coordinate - one.guess, at.rate - given.get(name, np.zeros(3))[one.number], size))
+    places = model.tree.places(start.q[None], start.v[None])
+    for joint in (joint for joint in model.scene.joint if not joint.locates):
+        a, b = (places.at(side) for side in model.tree.sides(joint))
+        left = logarithm(exponential(-vectors.get(joint.name, np.zeros(3))) @ a.F[0].T @ b.F[0])
+        rate = b.F[0].T @ (b.omega - a.omega)[0] - given.get(joint.name, np.zeros(3))
+        off.append((joint.name, left, rate, np.ones(3)))
     values, rates = initial.named("joints"), initial.named("joint_rates")
     moved = dict.fromkeys(
         name
