@@ -111,7 +111,9 @@ def cause_of(inversion: Inversion) -> str:
         k = linear.singular_after[0]
         return f"singular coupling between t = {linear.times[k]:.4g} and {linear.times[k + 1]:.4g} s, {INFINITE}"
     if is_coarse or not len(changed):
-        return f"{ADVICE[inversion.status]} (worst at t = {inversion.worst:.4g} s)"
+        return "; ".join(
+            [*inversion.servo.sticking, f"{ADVICE[inversion.status]} (worst at t = {inversion.worst:.4g} s)"]
+        )
     k = int(changed[0])
     return (
         f"zeros change sides along the path: {count[0]} of them are in the right half plane at t = 0, {count[k]} at t"

@@ -135,6 +135,11 @@ class Model:
         return {joint.name: _in_order(self.driven(joint.name)) for joint in self.scene.motor_joints}
 
     @property
+    def sticking(self) -> list[str]:
+        """Names of joints with dry friction."""
+        return [joint.name for joint in self.scene.joint if any(one.coulomb > 0 for one in joint.frictions)]
+
+    @property
     def motor_columns(self) -> Indices:
         """Indices (motors,) in v of all motor coordinates."""
         return np.array([column for columns in self.motors.values() for column in columns], dtype=np.intp)

@@ -301,9 +301,7 @@ def stiffness_of(system: MultibodySystem, at: State) -> Stiffness:
 
 
 def _sticks(model: Model) -> bool:
-    joints = (*(node.joint for node in model.tree.nodes), *model.tree.loops)
-    has_friction = any(friction.coulomb > 0 for joint in joints for friction in joint.frictions)
-    return has_friction and not model.tree.is_rigid
+    return bool(model.sticking) and not model.tree.is_rigid
 
 
 def _of_links(model: Model) -> float:

@@ -239,9 +239,14 @@ def raised(posed: Posed) -> str:
 
 
 def causes(context: Context, posed: Posed) -> str:
-    """Likely causes of no motion: zeros at infinity, rough ends of the path, patches far from its point; else ""."""
+    """Likely causes of no motion: friction, zeros at infinity, rough path ends, patches far from its point; else ""."""
     servo, linear = posed.asked.driven, posed.linear
-    texts = [*singular_times(servo, linear), *rough_ends(servo.functions, servo.end), *_far_patches(context, linear)]
+    texts = [
+        *servo.sticking,
+        *singular_times(servo, linear),
+        *rough_ends(servo.functions, servo.end),
+        *_far_patches(context, linear),
+    ]
     return "; ".join(texts)
 
 
