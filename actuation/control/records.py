@@ -167,17 +167,13 @@ class FilterRecord(Record):
         return {of.name: of.name for of in FilterRecord.references(self) if of.kind == "body"}
 
     def references(self) -> Iterator[Reference]:
-        """Yield references to points at which forces are inputs, to patches, and to joints of one coordinate."""
+        """Yield references to inputs, and to points at which forces are."""
         for key in ("process", "disturbance"):
             for name in getattr(self, key):
-                kind, _, rest = name.partition("/")
-                subject = rest.rpartition("/")[0]
-                if kind == "force" and "." in subject:
-                    yield Reference(key, subject)
-                elif kind == "pzt":
-                    yield Reference(key, subject, "patches")
-                elif kind == "joint" and rest[-2:-1] != " ":
-                    yield Reference(key, rest, "joint")
+                yield Reference(key, name, "input")
+                point = name.removeprefix("force/").rpartition("/")[0]
+                if name.startswith("force/") and "." in point:
+                    yield Reference(key, point)
 
 
 class KalmanRecord(ObserverRecord, FilterRecord):
@@ -377,6 +373,8 @@ class StateFeedback(ControllerRecord):
     gain: Matrix
     """K (inputs, states), in the unit of each command per unit of each state."""
 
+    refers_to = (("inputs", "command"),)
+
 
 Controller = Annotated[
     JointPid | ComputedTorque | ModalVelocity | Lqr | StateFeedback | PythonController, Field(discriminator="kind")
@@ -450,7 +448,9 @@ class SampledAnalysis(ActuatedAnalysis):
         ):  # fmt: skip
             for k, record in enumerate(records, 1):
                 yield from under(f"{label} no. {k}", record.references())
-        if isinstance(self.observer, KalmanRecord):
+        if isinstance(self.observer, GainsObserver):
+            yield from (Reference("observer: inputs", name, "command") for name in self.observer.inputs)
+        elif self.observer is not None:
             yield from under("observer", self.observer.references())
         if self.tip is not None:
             yield Reference("tip", self.tip)

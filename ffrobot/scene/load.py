@@ -24,6 +24,7 @@ from ..mbs.joints.joint import JointRecord
 from ..mbs.scene.analysis import Analysis, Surroundings
 from ..mbs.scene.bodies import BodyKeys
 from ..mbs.scene.mechanism import in_3d
+from ..mbs.scene.space import SPACES
 from ..mbs.scene.trajectories import Trajectory
 from .kinds import KINDS
 from .scene import Scene, SceneKeys
@@ -226,6 +227,13 @@ def _reference_problems(scene: SceneKeys) -> Iterator[str]:
     moving = [name for name, joint in joints.items() if _moves(joint)]
     patched = list(dict.fromkeys(layout.body for layout in scene.pzt))
     layouts = [layout.label for layout in scene.pzt]
+    axes = tuple(f"/{'xyz'[k]}" for k in SPACES[scene.space].translations)
+    commands = [
+        f"joint/{joint.name}" + (f" {k + 1}" if len(joint.units) > 1 else "")
+        for joint in scene.motor_joints
+        for k in range(len(joint.units))
+    ]
+    commands += [f"pzt/{of.label}/{k + 1}" for of in scene.pzt if of.is_driven for k in range(of.patch_count)]
     for reference in scene.references():
         key, name = reference.key, reference.name
         match reference.kind:
@@ -242,6 +250,12 @@ def _reference_problems(scene: SceneKeys) -> Iterator[str]:
             case "patched body" if name not in patched:
                 hint = did_you_mean(name, patched)
                 yield f'{key}: expected a body with patches, {quoted(patched)}, found "{name}"{hint}'
+            case "command" | "input" if name not in commands:
+                takes_forces = reference.kind == "input"
+                if not (takes_forces and name.startswith("force/") and name.endswith(axes)):
+                    also = ', or "force/BODY.POINT/x"' * takes_forces
+                    wanted = f"motors or driven patches ({quoted(commands)}{also})"
+                    yield f'{key}: expected {wanted}, found "{name}"{did_you_mean(name, commands)}'
             case "patches" if name not in layouts:
                 wanted = f"one of the layouts {quoted(layouts)}" if layouts else "a layout of patches ([[pzt]])"
                 yield f'{key}: expected {wanted}, found "{name}"{did_you_mean(name, layouts)}'
@@ -287,10 +301,6 @@ def _load_problems(scene: SceneKeys) -> Iterator[str]:
     passive = [layout.label for layout in scene.pzt if not layout.is_driven]
     shunted = [layout.label for layout in scene.pzt if layout.shunt is not None]
     for analysis in scene.analysis:
-        of_controllers = (getattr(one, "inputs", ()) for one in getattr(analysis, "controller", ()))
-        for name in (name for inputs in of_controllers if not isinstance(inputs, str) for name in inputs):
-            if name.removeprefix("pzt/").rpartition("/")[0] in passive:
-                yield f'analysis "{analysis.name}": inputs: expected patches {DRIVEN}, found "{name}"'
         for sensor in getattr(analysis, "sensor", ()):
             if sensor.pzt in shunted:
                 expected = "patches without a shunt, over which their charge flows off"

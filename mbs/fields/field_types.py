@@ -177,7 +177,7 @@ KeptSteps = Annotated[Steps, ReadBy(_steps, str)]
 NotEmpty = AfterValidator(_not_empty)
 
 
-Kind = Literal["body", "flexible body", "patches", "patched body", "joint", "elastic joint"]
+Kind = Literal["body", "flexible body", "patches", "patched body", "joint", "elastic joint", "command", "input"]
 
 
 @dataclass(frozen=True)
@@ -185,7 +185,7 @@ class Reference:
     """Reference to another table: the `key` that holds it, and its `name` "BODY", "BODY.POINT" or a joint's.
 
     `kind` is that of the other table: "patches" a layout, "patched body" a body with patches, "elastic joint" a joint
-    with stiffness. Forces of the mechanism act at a point that is `loaded`.
+    with stiffness, "command" a motor or patch, "input" also a force. Forces of the mechanism act at a `loaded` point.
     """
 
     key: str

@@ -160,7 +160,7 @@ NOISY = {"joint": "hub", "noise": 1e-5}
         ({"sensor": [NOISY | {"delay": 1.5 * STEP}]}, r"multiple of sample_time \(0.001 s\) as delay"),
         ({"sensor": [NOISY | {"sample_time": 2 * STEP}]}, "read at every sample, found no. 1 slower"),
         ({"process": {"force/arm.top/y": 1.0}}, 'process: expected a point of "arm" .*, found "arm.top"'),
-        ({"process": {"force": 1.0}}, 'estimate: linear model: expected an input .*, found "force"'),
+        ({"process": {"force": 1.0}}, 'process: expected motors .*, found "force"'),
     ],
 )
 def test_filters_that_patches_cannot_serve(keys, said):
