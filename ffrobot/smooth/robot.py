@@ -98,7 +98,7 @@ class Robot:
         check_point(self._prepared, self.point)
         self._gears = with_compliance(self._prepared.model.without_paths())
         self.has_gears, self._still = bool(self._gears.tree.gears), np.zeros(self._gears.tree.n_v)
-        self.bends = any(node.p_v.stop > node.p_v.start for node in self._gears.tree.nodes)
+        self.bends = not self._gears.tree.is_rigid
         self._frequency: float | None = None
 
     def units(self, per: str = "") -> str:

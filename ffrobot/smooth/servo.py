@@ -147,7 +147,6 @@ def fitted(frequency: Array, response: ComplexArray) -> Axis:
 
 ROUNDED = 9  # digits of times (s) of delayed set points
 LEFT = 1e-6  # of a step: what the controller has left to do counts as done
-NOTHING = 1e-26  # of a step: less than the round-off of a path that is one line in pauses from then on
 LASTING = 10.0  # s of set points before or after a motion, at most, in which zeros of controllers decay
 PART = 0.5  # of 1/|pole| at most between the nodes of a motor's path: its quintics are off by 3e-7 of a step
 
@@ -172,26 +171,24 @@ class Servo:
         ends = np.append(True, moves) | np.append(moves, True)  # not set points within a pause
         times, command = times[ends], command[ends]
         delays = np.array([axis.delay for axis in self.axes])
-        lasting = max(_decay(axis.poles, NOTHING) for axis in self.axes)
-        pauses = times[:-1][np.diff(times) > delays.max() + 3.0 * lasting] + delays.max() + lasting
-        if delays.any() or pauses.size:
-            given, every = times, np.append(np.add.outer(times, [0.0, *delays]), pauses)
-            times = np.unique(np.round(every, ROUNDED))
+        if delays.any():
+            given, times = times, np.unique(np.round(np.add.outer(times, [0.0, *delays]), ROUNDED))
             command = np.transpose([np.interp(times - d, given, of) for d, of in zip(delays, command.T, strict=True)])
         poles, shares = np.zeros((2, max(len(axis.denominator) for axis in self.axes) - 1, len(self.axes)), complex)
         for k, axis in enumerate(self.axes):
             own = axis.poles
             slopes = axis.denominator[0] * np.prod(own[:, None] - own + np.eye(len(own)), axis=1)
             poles[: len(own), k], shares[: len(own), k] = own, np.polyval(axis.numerator, own) / (own**2 * slopes)
-        steps = np.append(np.diff(times), self.settled)
+        steps, lasting = np.append(np.diff(times), self.settled), 4.0 * self.settled  # 1e-24 is left
         slopes = np.vstack([np.diff(command, axis=0) / np.diff(times)[:, None], np.zeros(command.shape[1])])
         left, later = np.zeros_like(poles), shares.sum(axis=0).real
         nodes, states = [times[:1]], [np.array([command[0], 0.0 * command[0], 0.0 * command[0]])[None]]
         for t, step, u, slope, change in zip(
             times, steps, command, slopes, np.diff(slopes, axis=0, prepend=0.0), strict=True
         ):
-            parts = 1.0 if step > 1.5 * lasting else np.ceil(step * np.abs(poles).max() / PART)
-            s = step * np.linspace(0.0, 1.0, int(parts) + 1)[1:, None]
+            brief = lasting if step > 2.0 * lasting else step  # behind that the path is a line
+            parts = np.linspace(0.0, brief, int(np.ceil(brief * np.abs(poles).max() / PART)) + 1)
+            s = np.unique(np.append(parts, step))[1:, None]
             decaying = (left + change * shares) * np.exp(poles * s[..., None])
             error, rate, bend = ((decaying * poles**k).sum(axis=1).real for k in range(3))
             nodes.append(t + s[:, 0])
@@ -229,10 +226,10 @@ class Servo:
         return position + np.fft.irfft(F * np.fft.rfft(rate, axis=0), count, axis=0)
 
 
-def _decay(poles: ComplexArray, part: float = LEFT) -> float:
-    """How long (s) until this `part` of the slowest is left; 0 without any, infinite on the imaginary axis."""
+def _decay(poles: ComplexArray) -> float:
+    """How long (s) until `LEFT` of the slowest is left; 0 without any, infinite on the imaginary axis."""
     slowest = float(np.abs(poles.real).min(initial=np.inf))
-    return float(-np.log(part)) / slowest if slowest else np.inf
+    return float(-np.log(LEFT)) / slowest if slowest else np.inf
 
 
 def quintics(nodes: Array, states: Array) -> Piecewise:

@@ -72,8 +72,8 @@ class Servo:
         """Yield that dry friction may be why no motion is found, where joints have any."""
         if names := self.model.sticking:
             yield (
-                f"dry friction of {quoted(names)}, which jumps where these stop, is the likely cause: leave out"
-                " coulomb_friction, or raise friction_speed"
+                f"dry friction of {quoted(names)} jumps where these stop: raise friction_speed, or leave"
+                " coulomb_friction out"
             )
 
     @property
