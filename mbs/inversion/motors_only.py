@@ -112,7 +112,7 @@ def cause_of(inversion: Inversion) -> str:
         return f"singular coupling between t = {linear.times[k]:.4g} and {linear.times[k + 1]:.4g} s, {INFINITE}"
     if is_coarse or not len(changed):
         return "; ".join(
-            [*inversion.servo.sticking, f"{ADVICE[inversion.status]} (worst at t = {inversion.worst:.4g} s)"]
+            [*inversion.servo.model.sticking, f"{ADVICE[inversion.status]} (worst at t = {inversion.worst:.4g} s)"]
         )
     k = int(changed[0])
     return (

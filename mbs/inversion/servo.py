@@ -1,13 +1,13 @@
 """A path whose force enters through the joint motors alone: see `zero_dynamics`."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from ...common.arrays import Array, Indices, in_parts
-from ...common.errors import InputError, quoted
+from ...common.errors import InputError
 from ...common.libraries import scipy
 from ...common.structs import struct
 from .. import _core
@@ -66,15 +66,6 @@ class Servo:
         times, near = self.near_times[::EVERY], self.near[::EVERY]
         ratio, worst = worst_posture(self.model, times, near)
         return describe_posture(self.model, ratio, float(times[worst]), near[worst], is_end=False)
-
-    @property
-    def sticking(self) -> Iterator[str]:
-        """Yield that dry friction may be why no motion is found, where joints have any."""
-        if names := self.model.sticking:
-            yield (
-                f"dry friction of {quoted(names)} jumps where these stop: raise friction_speed, or leave"
-                " coulomb_friction out"
-            )
 
     @property
     def functions(self) -> list[TimeFunction]:

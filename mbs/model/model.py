@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from ...common.arrays import Array, Booleans, Indices
+from ...common.errors import quoted
 from ...common.structs import struct
 from ..scene.mechanism import MechanismScene
 from .drives import Drive
@@ -136,8 +137,9 @@ class Model:
 
     @property
     def sticking(self) -> list[str]:
-        """Names of joints with dry friction."""
-        return [joint.name for joint in self.scene.joint if any(one.coulomb > 0 for one in joint.frictions)]
+        """Advice on joints with dry friction; none without any."""
+        names = [joint.name for joint in self.scene.joint if any(one.coulomb > 0 for one in joint.frictions)]
+        return [f"dry friction of {quoted(names)} jumps where these stop: raise friction_speed"] if names else []
 
     @property
     def motor_columns(self) -> Indices:

@@ -242,7 +242,7 @@ def causes(context: Context, posed: Posed) -> str:
     """Likely causes of no motion: friction, zeros at infinity, rough path ends, patches far from its point; else ""."""
     servo, linear = posed.asked.driven, posed.linear
     texts = [
-        *servo.sticking,
+        *servo.model.sticking,
         *singular_times(servo, linear),
         *rough_ends(servo.functions, servo.end),
         *_far_patches(context, linear),
