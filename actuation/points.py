@@ -164,8 +164,7 @@ def _automatic(name: str, body: ModalBody | None, spatial: Body, axes: str) -> P
 def _named(name: str, axes: tuple[str, ...], points: list[BodyPoint], spatial: Body) -> PointSet:
     # Moments on a body are measured against forces by its length
     length = spatial.length or max(float(np.linalg.norm(at.position)) for at in spatial.points.values()) or 1.0
-    per_length, per_mass = np.full(3, 1.0 / length), np.full(spatial.n_modes, np.sqrt(spatial.mass))
-    scale = np.concatenate([np.ones(3), per_length, per_mass])
+    scale = np.repeat([1.0, 1.0 / length, np.sqrt(spatial.mass)], [3, 3, spatial.n_modes])
     return PointSet(name, tuple(f"actuation{k}" for k in range(1, len(points) + 1)), axes, tuple(points), scale)
 
 

@@ -120,7 +120,7 @@ def _of_mat(path: Path) -> Iterator[Column]:
     """FRFs of variables frequency (F,), H (F, p), force and response (p names), and perhaps coherence (F, p)."""
     content = io.BytesIO(read_bytes(path, "file of FRFs"))
     try:
-        data = scipy.io.loadmat(content, chars_as_strings=True)
+        data = scipy.io.loadmat(content)
     except Exception:  # whatever SciPy finds in a file that is none
         raise InputError("expected a .mat file of version 7 or older (MATLAB: save -v7)", "another file") from None
     if missing := [name for name in ("frequency", "H", *ENDS) if name not in data]:
@@ -294,9 +294,8 @@ def _check(column: Column, inside: Booleans) -> None:
     if len(at) > 1 and (values.real > 0.0).all() and not values.imag.any():
         raise InputError("expected complex values", "positive real ones: a magnitude is no FRF")
     coherence = np.ones(1) if column.coherence is None else column.coherence[inside]
-    if not ((coherence >= 0.0) & (coherence <= 1.0)).all():
-        worst = coherence[np.nan_to_num(np.abs(coherence - 0.5), nan=np.inf).argmax()]
-        raise InputError("coherence: expected values from 0 to 1", f"{worst:g}")
+    if (wrong := coherence[~((coherence >= 0.0) & (coherence <= 1.0))]).size:
+        raise InputError("coherence: expected values from 0 to 1", f"{wrong[0]:g}")
 
 
 def _response(test: ResponseTest, column: Column, inside: Booleans) -> tuple[Direction, Direction, ComplexArray, Array]:
