@@ -134,7 +134,7 @@ def _modes_of(families: frozenset[Family], body: ModalBody, spatial: Body) -> Re
     rows = np.flatnonzero([moves and family in families for moves, family in zip(moving, body.family, strict=True)])
     T_inverse, square = spatial.on_file, np.ix_(rows, rows)
     T, stiffness = uncoupling((T_inverse.T @ T_inverse)[square], (T_inverse.T * spatial.stiffness @ T_inverse)[square])
-    modes_first = np.argsort(body.residual[rows], kind="stable")
+    modes_first = np.lexsort((stiffness, body.residual[rows]))
     served = int(np.count_nonzero(body.residual[rows] == 0))
     return ReachedModes(rows, T[:, modes_first], stiffness[modes_first], served)
 
