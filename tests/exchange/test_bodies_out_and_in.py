@@ -92,6 +92,8 @@ def test_modes_of_any_normalisation_become_orthonormal(bodies):
     signs = np.sign(np.einsum("an,an->n", back.interfaces["tip"].translation, body.interfaces["tip"].translation))
     np.testing.assert_allclose(back.S_bar * signs, body.S_bar, atol=1e-10)
     np.testing.assert_allclose(back.I_bar * signs, body.I_bar, atol=1e-10)
+    text, _ = fem_text(mixed(body, np.eye(body.mode_count)[:, ::-1]))  # the highest first
+    np.testing.assert_array_equal(read_fem(text.replace("ffrobot: ", ""), body.name)[0].frequency, body.frequency)
 
 
 def mixed(body, T):

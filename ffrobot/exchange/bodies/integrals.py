@@ -235,6 +235,9 @@ def modal_body(name: str, integrals: ShapeIntegrals, nodes: Nodes, text: str) ->
     condition, numbers = _noted(text, nodes)
     integrals, remarks = _with_agreed_masses(integrals)
     T, omega2 = _orthonormal(integrals)
+    if condition is None:  # ffrobot writes modes in their order
+        order = np.argsort(omega2, kind="stable")
+        T, omega2 = T[:, order], omega2[order]
     integrals, n = integrals.transformed(T), len(omega2)
     root = omega2**0.25
     Z = integrals.damping / np.outer(root, root)
