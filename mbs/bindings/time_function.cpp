@@ -1,4 +1,4 @@
-#include "core/time_function/time_function.h"
+#include "core/time_function/functions_of_time.h"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/stl/function.h>
@@ -30,9 +30,14 @@ TimeFunction compiled_function(std::uintptr_t address) {
 
 RowMajor sample(const TimeFunction &function, const VectorXd &times) {
   RowMajor found(3, times.size());
-  for (Index i = 0; i < times.size(); ++i) {
-    const Jet jet = function(times[i]);
-    found.col(i) << jet.value, jet.rate, jet.acceleration;
+  FunctionsOfTime functions({function});
+  for (Index first = 0, count; first < times.size(); first += count) {
+    count = std::min<Index>(times.size() - first, 256); // whose jets stay in the cache
+    functions.find(times.data() + first, static_cast<int>(count));
+    for (Index i = 0; i < count; ++i) {
+      const Jet jet = functions.jet(i, 0);
+      found.col(first + i) << jet.value, jet.rate, jet.acceleration;
+    }
   }
   return found;
 }

@@ -80,34 +80,18 @@ std::size_t FunctionsOfTime::take(const Expression::Instruction &what, const std
 void FunctionsOfTime::evaluate(const Part &part) {
   const Jets &x = values_[part.operands[0]], &z = values_[part.operands[2]];
   Jets &to = values_[part.value];
+  const Op op = part.what.op;
   if (part.what.takes_constant)
-    to = apply_constant(part.what.op, z, part.what.constant);
+    to = apply_constant(op, z, part.what.constant);
   else if (part.power > 0)
     to = integer_power(x, part.power);
+  else if (op == Op::sin)
+    sine_and_cosine(z, to, values_[part.value + 1]);
+  else if (is_simple(op))
+    to = apply_simple(op, x, values_[part.operands[1]], z);
   else
-    switch (part.what.op) {
-    case Op::add:
-      to = x + z;
-      break;
-    case Op::subtract:
-      to = x - z;
-      break;
-    case Op::multiply:
-      to = x * z;
-      break;
-    case Op::divide:
-      to = x / z;
-      break;
-    case Op::negate:
-      to = -z;
-      break;
-    case Op::sin:
-      sine_and_cosine(z, to, values_[part.value + 1]);
-      break;
-    default:
-      for (std::size_t i = 0; i < together; ++i)
-        put(apply(part.what, one_of(x, i), one_of(values_[part.operands[1]], i), one_of(z, i)), to, i);
-    }
+    for (std::size_t i = 0; i < together; ++i)
+      put(apply(part.what, one_of(x, i), one_of(values_[part.operands[1]], i), one_of(z, i)), to, i);
 }
 
 void FunctionsOfTime::find(const double *times, int count) {

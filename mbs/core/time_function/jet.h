@@ -108,28 +108,34 @@ inline Jet power(const Jet &u, const Jet &exponent) {
   return chain(u, std::pow(u.value, n), n * std::pow(u.value, n - 1.0), n * (n - 1.0) * std::pow(u.value, n - 2.0));
 }
 
-inline Jet truth(bool holds, const Jet &a, const Jet &b) {
-  if (std::isnan(a.value) || std::isnan(b.value))
-    return {nan, nan, nan};
-  return {holds ? 1.0 : 0.0, 0.0, 0.0};
-}
-
-inline Jet select(const Jet &condition, const Jet &a, const Jet &b) {
-  if (std::isnan(condition.value))
-    return condition;
-  return condition.value != 0.0 ? a : b;
-}
-
 inline double finite_or_nan(double x) { return std::isfinite(x) ? x : nan; }
 inline Jet finite_or_nan(const Jet &jet) {
   return {finite_or_nan(jet.value), finite_or_nan(jet.rate), finite_or_nan(jet.acceleration)};
 }
 
+// 1 where it holds, else 0; NaN where an operand is
+template <class T, class Mask>
+[[gnu::always_inline]] inline JetOf<T> truth(const Mask &holds, const JetOf<T> &a, const JetOf<T> &b) {
+  const T none = T{} + nan, zero{};
+  const auto is_known = (a.value == a.value) & (b.value == b.value);
+  const T rate = is_known ? zero : none;
+  return {is_known ? (holds ? zero + 1.0 : zero) : none, rate, rate};
+}
+
+template <class T>
+[[gnu::always_inline]] inline JetOf<T> select(const JetOf<T> &condition, const JetOf<T> &a, const JetOf<T> &b) {
+  const auto chosen = condition.value != 0.0, is_known = condition.value == condition.value;
+  const auto of = [&](const T &x, const T &y) { return is_known ? (chosen ? x : y) : condition.value; };
+  return {of(a.value, b.value), of(a.rate, b.rate), of(a.acceleration, b.acceleration)};
+}
+
+/// Whether `apply_simple` has it: arithmetic, comparisons and logic, which work on numbers side by side, too
+inline bool is_simple(Op op) { return op < Op::power || op == Op::negate || op >= Op::less; }
+
 // Of an instruction with operands: of one z, of two x and z, of three x, y and z
-[[gnu::always_inline]] inline Jet apply(const Expression::Instruction &i, const Jet &x, const Jet &y, const Jet &z) {
-  if (i.takes_constant)
-    return apply_constant(i.op, z, i.constant);
-  switch (i.op) {
+template <class T>
+[[gnu::always_inline]] inline JetOf<T> apply_simple(Op op, const JetOf<T> &x, const JetOf<T> &y, const JetOf<T> &z) {
+  switch (op) {
   case Op::add:
     return x + z;
   case Op::subtract:
@@ -138,10 +144,37 @@ inline Jet finite_or_nan(const Jet &jet) {
     return x * z;
   case Op::divide:
     return x / z;
-  case Op::power:
-    return power(x, z);
   case Op::negate:
     return -z;
+  case Op::less:
+    return truth(x.value < z.value, x, z);
+  case Op::less_equal:
+    return truth(x.value <= z.value, x, z);
+  case Op::greater:
+    return truth(x.value > z.value, x, z);
+  case Op::greater_equal:
+    return truth(x.value >= z.value, x, z);
+  case Op::logical_and:
+    return truth((x.value != 0.0) & (z.value != 0.0), x, z);
+  case Op::logical_or:
+    return truth((x.value != 0.0) | (z.value != 0.0), x, z);
+  case Op::logical_not:
+    return truth(z.value == 0.0, z, z);
+  default:
+    return select(x, y, z);
+  }
+}
+
+// Likewise, of any instruction
+[[gnu::always_inline]] inline Jet apply(const Expression::Instruction &i, const Jet &x, const Jet &y, const Jet &z) {
+  if (i.takes_constant)
+    return apply_constant(i.op, z, i.constant);
+  switch (i.op) {
+  case Op::constant:
+  case Op::time:
+    return {i.constant, 0.0, 0.0};
+  case Op::power:
+    return power(x, z);
   case Op::sin:
     return chain(z, std::sin(z.value), std::cos(z.value), -std::sin(z.value));
   case Op::cos:
@@ -158,27 +191,9 @@ inline Jet finite_or_nan(const Jet &jet) {
     return abs(z);
   case Op::tanh:
     return tanh(z);
-  case Op::less:
-    return truth(x.value < z.value, x, z);
-  case Op::less_equal:
-    return truth(x.value <= z.value, x, z);
-  case Op::greater:
-    return truth(x.value > z.value, x, z);
-  case Op::greater_equal:
-    return truth(x.value >= z.value, x, z);
-  case Op::logical_and:
-    return truth(x.value != 0.0 && z.value != 0.0, x, z);
-  case Op::logical_or:
-    return truth(x.value != 0.0 || z.value != 0.0, x, z);
-  case Op::logical_not:
-    return truth(z.value == 0.0, z, z);
-  case Op::select:
-    return select(x, y, z);
-  case Op::constant:
-  case Op::time:
-    break;
+  default:
+    return apply_simple(i.op, x, y, z);
   }
-  return {i.constant, 0.0, 0.0};
 }
 
 } // namespace ffrobot
