@@ -125,20 +125,19 @@ inline void accelerate_body(const Node<Space> &node, const T *q, bool by_multipl
   const int i_node = node.index;
   Hinge<Space, T> &hinge = w.hinges[i_node];
   auto &state = w.bodies[i_node];
-  T *A = hinge.A;
+  T *A = hinge.A, outer[d];
   if (node.parent < 0) {
     T ground[d];
     ground_acceleration(w.m, node.parent_port, ground);
     for (T &x : ground)
       x = by_multipliers ? T(0.) : x;
-    hinge.turn.back(ground, A);
+    hinge.turn.back(ground, outer);
   } else
-    hinge.turn.back(w.ports[node.parent_port].A, A);
+    hinge.turn.back(w.ports[node.parent_port].A, outer);
   if (!node.shape.is_centred)
-    Space::template Turn<T>::shift(hinge.r, A);
-  if (!by_multipliers)
-    for (int i = 0; i < d; ++i)
-      A[i] += hinge.c[i];
+    Space::template Turn<T>::shift(hinge.r, outer);
+  for (int i = 0; i < d; ++i)
+    A[i] = by_multipliers ? outer[i] : outer[i] + hinge.c[i];
   accelerate_joint(node, q + node.q, hinge, w, y, A, a + node.v);
   T frame[packed<T, d>] = {}, *A_frame = A;
   T *z = w.z.data();

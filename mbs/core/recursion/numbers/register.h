@@ -72,13 +72,13 @@ struct Register<n> {
       lane[k] = k;
     v = lane < I{} + count ? v : V{};
   }
-  FFROBOT_INLINE double sum() const {
+  FFROBOT_INLINE double sum() const { // half and half: three additions one after the other
     if constexpr (n == 2)
       return v[0] + v[1];
     else if constexpr (n == 4)
-      return (v[0] + v[2]) + (v[1] + v[3]);
+      return (Register<2>{{v[0], v[1]}} + Register<2>{{v[2], v[3]}}).sum();
     else
-      return ((v[0] + v[4]) + (v[2] + v[6])) + ((v[1] + v[5]) + (v[3] + v[7]));
+      return (Register<4>{{v[0], v[1], v[2], v[3]}} + Register<4>{{v[4], v[5], v[6], v[7]}}).sum();
   }
   FFROBOT_INLINE Register &operator+=(const Register &o) { return v += o.v, *this; }
   FFROBOT_INLINE Register &operator-=(const Register &o) { return v -= o.v, *this; }

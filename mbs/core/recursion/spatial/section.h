@@ -63,29 +63,24 @@ template <class T> inline void rotation_series(const T &y, T &a, T &b, T &a_rate
 }
 
 // exp(phi) = I + (1 - y b) phi~ + a phi~^2, J_l = I + a phi~ + b phi~^2, y = |phi|^2, from phi and phi_dot
-template <class T> inline void turn_section(PortMotion<T> &m) {
+template <class T> FFROBOT_INLINE void turn_section(PortMotion<T> &m) {
   const T *f = m.phi, *d = m.phi_dot, y = dot(f, f), y_dot = 2. * dot(f, d);
   T a, b, a_rate, b_rate, fd[3], ffd[3], dfd[3];
   rotation_series(y, a, b, a_rate, b_rate);
   const T sinc = 1. - y * b;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) {
-      const T square = i == j ? f[i] * f[j] - y : f[i] * f[j];
-      m.excess[i][j] = b * square;
-      m.turn[i][j] = i == j ? a * square + 1. : a * square;
-    }
   for (int i = 0; i < 3; ++i) {
-    const int j = (i + 1) % 3, k = (i + 2) % 3; // phi~_kj = phi_i
-    m.excess[k][j] += a * f[i], m.excess[j][k] -= a * f[i];
-    m.turn[k][j] += sinc * f[i], m.turn[j][k] -= sinc * f[i];
+    const int j = (i + 1) % 3, k = (i + 2) % 3;           // phi~_kj = phi_i
+    const T here = f[i] * f[i] - y, beside = f[j] * f[k]; // of phi~^2
+    m.excess[i][i] = b * here, m.turn[i][i] = a * here + 1.;
+    m.excess[k][j] = b * beside + a * f[i], m.excess[j][k] = b * beside - a * f[i];
+    m.turn[k][j] = a * beside + sinc * f[i], m.turn[j][k] = a * beside - sinc * f[i];
   }
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
       m.columns[j][3 + i] = m.excess[i][j];
   cross(f, d, fd), cross(f, fd, ffd), cross(d, fd, dfd);
-  turn(m.excess, d, m.rate);
   for (int i = 0; i < 3; ++i) {
-    m.rate[i] += d[i];
+    m.rate[i] = d[i] + a * fd[i] + b * ffd[i];
     m.drift[i] = a_rate * y_dot * fd[i] + b_rate * y_dot * ffd[i] + b * dfd[i];
   }
 }
