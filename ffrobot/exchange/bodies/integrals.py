@@ -108,16 +108,11 @@ class ShapeIntegrals:
 def integrals_of(body: ModalBody) -> ShapeIntegrals:
     """Return the integrals of a modal body, including the inertia of sections about their axis."""
     spatial = from_modal_body(body.name, body)
+    same = ("mass", "first_moment", "S_bar", "inertia", "inertia_slope", "spin", "damping")
     return ShapeIntegrals(
-        mass=spatial.mass,
-        first_moment=spatial.first_moment,
-        S_bar=spatial.S_bar,
-        inertia=spatial.inertia,
-        inertia_slope=spatial.inertia_slope,
-        spin=spatial.spin,
+        **{key: getattr(spatial, key) for key in same},
         modal_mass=body.modal_mass,
         stiffness=body.stiffness,
-        damping=spatial.damping,
         **slopes(spatial.S_bar_kl),
     )
 
