@@ -279,6 +279,9 @@ class Placement(Record):
 
     Modes are the lowest of the robot with locked motors; with criterion "voltage", those of the link, whose forces in
     the inverse analysis `about` count. With "estimate" patches are sensors.
+
+    Patches stiffen the link where the scene has them, also while others are tried. Exact is a second run with the
+    centers found, or one with `structural = false`.
     """
 
     body: str
