@@ -11,6 +11,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
@@ -109,12 +110,8 @@ def integrals_of(body: ModalBody) -> ShapeIntegrals:
     """Return the integrals of a modal body, including the inertia of sections about their axis."""
     spatial = from_modal_body(body.name, body)
     same = ("mass", "first_moment", "S_bar", "inertia", "inertia_slope", "spin", "damping")
-    return ShapeIntegrals(
-        **{key: getattr(spatial, key) for key in same},
-        modal_mass=body.modal_mass,
-        stiffness=body.stiffness,
-        **slopes(spatial.S_bar_kl),
-    )
+    own: dict[str, Any] = {key: getattr(spatial, key) for key in same} | slopes(spatial.S_bar_kl)
+    return ShapeIntegrals(**own, modal_mass=body.modal_mass, stiffness=body.stiffness)
 
 
 def slopes(S: Array) -> dict[str, Array]:
