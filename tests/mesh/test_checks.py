@@ -50,9 +50,8 @@ def test_inverted_elements_are_told(box):
 def test_flat_elements_are_told():
     box = structured_box(1.0, SECTION, SECTION, (10, 1, 1), "tetrahedron")
     cells = np.concatenate([box.cells, [[0, 1, 4, 5]]])
-    points = box.points.copy()
     flat = replace(box, cells=cells, cell_tag=np.zeros(len(cells), dtype=np.int32))
-    x = points[[0, 1, 4, 5]]
+    x = box.points[[0, 1, 4, 5]]
     assert abs(np.linalg.det(x[1:] - x[0])) < 1e-12
     with pytest.raises(InputError, match=r"found 1 flat elements \(slivers\) of 61, e.g. at \(0.05"):
         check_quality(flat)
