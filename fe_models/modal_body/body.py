@@ -153,7 +153,7 @@ class ModalBody(Integrals, Frozen):
 
     @property
     def begin(self) -> float:
-        """Place x, m, where the length begins: at the first station, or the root if stations go beyond."""
+        """Place x, m, where the length begins: the first station, or the root if stations go beyond."""
         first, last = self.stations.position[[0, -1], 0]
         is_first = abs(self.length - last + first) <= INTERFACE_TOLERANCE * self.length
         return float(first if is_first else self.interfaces["root"].position[0])

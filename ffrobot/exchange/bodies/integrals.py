@@ -227,7 +227,7 @@ def modal_body(name: str, integrals: ShapeIntegrals, nodes: Nodes, text: str) ->
     condition, numbers = _noted(text, nodes)
     integrals, remarks = _with_agreed_masses(integrals)
     T, omega2 = _orthonormal(integrals)
-    if condition is None:  # ffrobot writes modes in their order
+    if condition is None:  # ffrobot has its own order
         order = np.argsort(omega2, kind="stable")
         T, omega2 = T[:, order], omega2[order]
     integrals, n = integrals.transformed(T), len(omega2)
@@ -253,7 +253,7 @@ def modal_body(name: str, integrals: ShapeIntegrals, nodes: Nodes, text: str) ->
     if condition == CRAIG_BAMPTON and not constraint:
         condition = "cantilever"  # which holds the root alike
     omega, stations = np.sqrt(omega2), _stations(nodes, ends, length)
-    if len(stations.position) == len(ends):
+    if len(stations.position) == 2:
         remarks += ("shapes between root and tip are cubics: no node lies on a line along x",)
     body = ModalBody(
         name=name,
