@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import tomli_w
@@ -17,7 +17,7 @@ from rich.console import Console
 from ..actuation.control.linear import LinearModels
 from ..actuation.control.linear_model import locked_frequencies, robot_modes
 from ..common.arrays import Array
-from ..common.errors import FfrobotError, InputError
+from ..common.errors import FfrobotError, InputError, check_known, either
 from ..common.files import AnyPath, check_new_file, write_atomically
 from ..common.toml_files import load_toml, read_text
 from ..common.validation import check_texts
@@ -94,6 +94,7 @@ class RobotTarget:
     families: tuple[str, ...] = ()
 
     def __init__(self, path: Path, motors: str) -> None:
+        check_known(motors, get_args(Motors), f"motors: expected {either(get_args(Motors))}")
         self._path, self._motors = path, motors
         self._scene = load_toml(path, "scene file")
         load_scene(path)
@@ -226,6 +227,8 @@ class VariedKeys:
         self.target, self._place = target, None if output is None else Path(output)
         self._groups = [tuple(tuple(name.strip().split(".")) for name in text.split("=")) for text in vary]
         keys = [key for group in self._groups for key in group]
+        if not keys:
+            raise InputError("--vary: expected at least one key", "none")
         check_once(keys)
         self._starts = {key: number_at(path, key, "--vary", "link or scene file") for key in keys}
         for key, value in self._starts.items():

@@ -228,6 +228,10 @@ def test_frfs_without_motion_and_keys_that_are_there_twice(tmp_path):
     files = arm_in_gravity(tmp_path, 1e3, 1.0)
     with pytest.raises(InputError, match=r"every key once, found joint\.a\.stiffness several"):
         ffrobot.fit_responses(*files, ["joint.a.stiffness", "joint.a.damping=joint.a.stiffness"])
+    with pytest.raises(InputError, match="at least one key, found none"):
+        ffrobot.fit_responses(*files, [])
+    with pytest.raises(InputError, match='motors: expected "free" or "locked", found "loose"'):
+        ffrobot.fit_responses(*files, ["joint.a.stiffness"], motors="loose")
     table = tmp_path / "0.csv"
     table.write_text(table.read_text().replace("/y", "/z"))
     with pytest.raises(InputError, match=r'test "0": arm.tip z → arm.tip -y: expected an FRF of directions'):
