@@ -118,8 +118,8 @@ def fitted(texts: Sequence[str], room: int, width: int) -> list[str]:
     if not texts or room < 1:
         return []
     labels = [text[:LABEL] for text in texts]
-    order = sorted(range(len(texts)), key=lambda k: labels[k].startswith(VIBRATION) or labels[k] in labels[:k])
-    beside = len(_wrapped(texts[order[1]], width)) if len(texts) > 1 else 0
+    order = sorted(range(1, len(texts)), key=lambda k: labels[k].startswith(VIBRATION) or labels[k] in labels[:k])
+    beside = len(_wrapped(texts[order[0]], width)) if order else 0
     free = room - beside if beside <= room - 2 else room
     ends_early = len(_wrapped(_counted(texts[0], len(texts) - 1), width)) > free
 
@@ -133,7 +133,7 @@ def fitted(texts: Sequence[str], room: int, width: int) -> list[str]:
         return [line for block in blocks for line in block]
 
     shown = [0]
-    for k in order[1:]:
+    for k in order:
         if len(laid_out(tried := sorted([*shown, k]))) <= room:
             shown = tried
     return laid_out(shown)

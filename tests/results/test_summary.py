@@ -106,6 +106,7 @@ def test_texts_are_whole_or_counted(room):
     """The first warning and the first advice go before other warnings; a text alone that has no room says so."""
     label = [f"warning    {'many words ' * 12}no. {k}" for k in range(3)]
     texts = [*label, "to try     a remedy", "note       a fact"]
+    assert fitted(short := ["vibration  of a point", *texts[3:]], 3 + room, 60) == short
     lines = fitted(texts, room, 60)
     assert 0 < len(lines) <= room
     assert max(map(len, lines)) <= 60
