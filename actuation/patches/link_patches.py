@@ -105,7 +105,7 @@ class LinkPatches:
         unmet, found = self.unmet(F_p, within), {}
         for name, array in self.arrays.items():
             own = np.s_[:, self.columns(name)]
-            found[name] = Voltages(required[own], within[own], array.modes.forces(unmet), array.served)
+            found[name] = Voltages(required[own], within[own], array.modes.forces(unmet))
         return found
 
     @property

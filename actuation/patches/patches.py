@@ -147,16 +147,10 @@ class Voltages:
     required: Array
     within_limit: Array  # (T, k) V, the best within the limits of the patches
     unmet: Array  # (T, n) N/√kg, modal forces that `within_limit` leaves
-    served: int  # number of modes, the first ones, that the patches are to serve
 
     def at(self, rows: Indices) -> "Voltages":
         """The voltages at some outputs alone, by their indices (k,)."""
-        return Voltages(self.required[rows], self.within_limit[rows], self.unmet[rows], self.served)
-
-    @property
-    def residual(self) -> Array:
-        """Norm (T,), N/√kg, of the modal force on served modes that `within_limit` leaves unmet."""
-        return np.linalg.norm(self.unmet[:, : self.served], axis=1)
+        return Voltages(self.required[rows], self.within_limit[rows], self.unmet[rows])
 
     @property
     def largest(self) -> float:

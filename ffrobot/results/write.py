@@ -167,7 +167,8 @@ def _write_voltages(group: h5py.Group, solution: Solution, actuation: Actuation)
     for body, of_link in solution.patches.items():
         for name, patches in of_link.arrays.items():
             entry, unmet = group.create_group(f"pzt/{name}"), actuation.unmet[body]
-            entry["residual"] = actuation.voltages[name].residual
+            left = actuation.voltages[name].unmet[:, : patches.served]
+            entry["residual"] = np.linalg.norm(left, axis=1)
             write_record(entry, patches)
             if solution.scene.is_planar:  # modes of the equations
                 entry["residual_force"] = unmet @ solution.bodies[body].spatial.modal_transform
