@@ -300,7 +300,11 @@ def _load_problems(scene: SceneKeys) -> Iterator[str]:
     counts = {layout.label: layout.patch_count for layout in scene.pzt}
     passive = [layout.label for layout in scene.pzt if not layout.is_driven]
     shunted = [layout.label for layout in scene.pzt if layout.shunt is not None]
+    bare = {layout.body for layout in scene.pzt} - {layout.body for layout in scene.pzt if layout.is_driven}
     for analysis in scene.analysis:
+        damped = (name for one in getattr(analysis, "controller", ()) for name in getattr(one, "bodies", ()))
+        for name in bare.intersection(damped):
+            yield f'analysis "{analysis.name}": bodies: expected patches {DRIVEN}, found "{name}"'
         for sensor in getattr(analysis, "sensor", ()):
             if sensor.pzt in shunted:
                 expected = "patches without a shunt, over which their charge flows off"

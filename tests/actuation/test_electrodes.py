@@ -191,6 +191,10 @@ def test_voltages_for_passive_patches_are_refused():
     seen = {"name": "seen", "kind": "linear", "sensor": [{"pzt": "strip"}]}
     with pytest.raises(InputError, match=r'"seen": sensor: pzt: expected patches without a shunt.*, found "strip"'):
         one_link("strip", LINK, seen, pzt=shunted)
+    damper = {"kind": "modal-velocity", "bodies": ["strip"], "damping_ratio": 0.1}
+    damped = {"kind": "closed-loop", "actuation": "bent", "sample_time": 1e-3, "controller": [damper]}
+    with pytest.raises(InputError, match=r'"damped": bodies: expected patches that voltages drive .*, found "strip"'):
+        one_link("strip", LINK, bent, {"name": "damped"} | damped, pzt=shunted)
 
 
 def test_passive_patches_need_nothing_and_pieces_leave_their_charge_whole():
