@@ -4,6 +4,7 @@ Mass and stiffness of patches, where the scene adds them to the link, stay where
 """
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations_with_replacement
 from math import ceil, comb
@@ -132,7 +133,11 @@ def place(
         lowest = np.argsort(stiffness)[:modes]
         frequency, shape = np.sqrt(stiffness[lowest]) / (2 * np.pi), np.eye(len(stiffness))[lowest]
         share = np.ones(len(lowest))
-    even = link.patches(count=count, centers=None)
+    spread = patch_edges(layout.with_one_limit(count=count, centers=None), link.array.link.length).mean(axis=1)
+    even = spread, np.zeros((len(Phi_V), count)), np.ones(count)
+    with suppress(InputError):  # else they do nothing
+        array = link.patches(count=count, centers=None)
+        even = spread, array.Phi_V, array.effects.capacitance.diagonal()
     largest = np.square(shape @ Phi_V).max(axis=1)
     if not np.all(largest > 0.0):
         raise InputError(f'{key}: expected modes that patches on "{layout.body}" can reach', "some they cannot")
@@ -150,10 +155,7 @@ def place(
 
     room = len(centers) - (count - 1) * gap
     indices, sets, method = _search(room, gap * np.arange(count), wanted.most_sets, lambda i: judge(Phi_V[:, i], C[i]))
-    found = [
-        (centers[indices], Phi_V[:, indices], C[indices]),
-        (patch_edges(even.layout, even.link.length).mean(axis=1), even.Phi_V, even.effects.capacitance.diagonal()),
-    ]
+    found = [(centers[indices], Phi_V[:, indices], C[indices]), even]
     rated = [Evaluation(x, gain(P).sum(axis=1), float(judge(P[:, None], of[None])[0])) for x, P, of in found]
     voltages = [np.nan if F_p is None else float(_voltages(shape, P[:, None], F_p)[0]) for _, P, _ in found]
     best = 0 if rated[0].value >= rated[1].value else 1  # even spacing need not be on the grid
@@ -240,11 +242,9 @@ def _candidates(
     centers = length / 2 + spacing * np.arange(steps + 1)
     columns, capacitance = np.zeros((len(link.array.Phi_V), len(centers))), np.ones(len(centers))
     for k, center in enumerate(centers):
-        try:
+        with suppress(InputError):  # across a step of the section: such a patch does nothing
             patch = link.patches(count=None, centers=(float(center),))
-        except InputError:  # across a step of the section: such a patch does nothing
-            continue
-        columns[:, k], capacitance[k] = patch.Phi_V[:, 0], patch.effects.capacitance[0, 0]
+            columns[:, k], capacitance[k] = patch.Phi_V[:, 0], patch.effects.capacitance[0, 0]
     return centers, gap, columns, capacitance
 
 
@@ -433,7 +433,7 @@ def _link(context: ActuatedContext, wanted: Placement) -> PatchableLink:
     def patches(**changes: object) -> PatchArray:
         one = array.layout.with_one_limit(**({"mode_weights": None, "point_weights": None} | changes))
         if not np.array_equal((found := placed(one)).modes.rows, array.modes.rows):
-            raise InputError(f'{path}: placement.body: expected patches that excite the modes of "{label}"')
+            raise InputError("expected the same modes")
         return found
 
     return PatchableLink(array, bodies, array.modes.coordinates(to_file.T).T, patches)

@@ -250,8 +250,7 @@ def effects(placed: Sequence[PlacedLayout], body: ModalBody) -> list[Effects]:
         layers = layers_on_link(placed, body)
         Phi_V -= (layers.straight - layers.by_volts).T @ layers.B
         C += np.outer(opened, opened) * layers.yielding
-    turns = np.abs(body.stations.rotation).max(axis=(0, 1))
-    loads = np.concatenate([one.per_volt for one in found])
+    loads, turns = np.concatenate([one.per_volt for one in found]), np.abs(body.stations.rotation).max(axis=(0, 1))
     Phi_V *= np.abs(Phi_V) > ROUND_OFF * np.abs(np.outer(loads, turns))
     ends = np.cumsum([len(one.edges) for one in placed])[:-1]
     parts = zip(found, np.split(Phi_V, ends), np.split(C, ends), strict=True)

@@ -302,8 +302,7 @@ def _together(
     """Reach of layouts side by side: all modal forces that are left count alike."""
     for layout in layouts:
         if layout.mode_weights is not None or layout.point_weights is not None:
-            beside = f'with other layouts on "{layout.body}"'
-            raise InputError(f"{_key(layout)}: expected no weights {beside}", "them")
+            raise InputError(f'{_key(layout)}: expected no weights with other layouts on "{layout.body}"', "them")
     Phi_V = reached.forces(per_volt).T
     amplifiers = joined(of.amplifiers for of in arrays.values())
     return Reach(reached, Phi_V, amplifiers, served_first(reached.served, *Phi_V.shape))
