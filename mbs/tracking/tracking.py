@@ -333,6 +333,7 @@ def _around(context: Context, posed: Posed, tracked: Tracked, least: Tracked, ob
         prices={
             kind: context.model.by_motor(of) if kind == "torque" else _by_body(context, of)
             for kind, of in tracked.prices.items()
+            if kind not in ("error", "curving")  # of points: tolerance_price
         },
     )
 
