@@ -158,11 +158,11 @@ def path_times(times: Array, paths: Iterable[Trajectory], end: float, others: It
     """
     paths, others, ends = list(paths), list(others), times[[0, -1]]
     functions = [*(target for path in paths for _, target in path.targets), *others]
-    times = _with_others(times, _even(ends))
+    times = with_others(times, _even(ends))
     of_paths = (path.path.breaks for path in paths if path.path is not None)
     of_pieces = (_brief_parts(function, ends) for function in functions)
     of_humps = (_humps(function, ends) for function in (*_formulas(paths), *others))
-    times = _with_others(times, _inside(np.concatenate([ends, *of_paths, *of_pieces, *of_humps]), ends))
+    times = with_others(times, _inside(np.concatenate([ends, *of_paths, *of_pieces, *of_humps]), ends))
     moving = (times >= 0.0) & (times <= end)
     inside = times[moving]
     if len(inside) > 1:  # a run may end before the path begins
@@ -171,7 +171,7 @@ def path_times(times: Array, paths: Iterable[Trajectory], end: float, others: It
     return np.union1d(times[~moving], inside)
 
 
-def _with_others(times: Array, others: Array) -> Array:
+def with_others(times: Array, others: Array) -> Array:
     """(T,) s: `times`, and `others` that are not next to one of them: a spline through both would swing."""
     at = np.clip(np.searchsorted(times, others), 1, max(len(times) - 1, 1))
     gap = np.minimum(np.abs(others - times[at - 1]), np.abs(others - times[np.minimum(at, len(times) - 1)]))

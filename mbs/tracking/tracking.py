@@ -19,6 +19,7 @@ from ...common.structs import struct
 from ...common.validation import Record
 from ..analysis.forward import Forward, largest_moments
 from ..fields.field_types import NotNegative, Positive
+from ..inversion.collocation import between
 from ..inversion.motors_only import AroundPath, check_rest, durations, outcome_along
 from ..inversion.servo import Servo, Stopped, make_servo
 from ..inversion.stable_inversion import with_corners
@@ -27,6 +28,7 @@ from ..model.model import Model
 from ..run.context import Context, PatchedLink, amplifiers_on, strain_directions
 from ..run.integrators import Choice
 from ..run.record import Run, Statistics
+from ..run.stops import with_others
 from ..scene.analysis import Check, Need, Robustness, TimedAnalysis, output_times
 from .advice import (
     Bounds,
@@ -43,7 +45,7 @@ from .advice import (
     slowest,
     warnings_of,
 )
-from .gear_motion import largest_shares, torques_beyond, within_limits
+from .gear_motion import MANY, largest_shares, torques_beyond, within_limits
 from .geared import GearedServo, with_gears
 from .problem import refined, settled, start_breaks
 from .transition import (
@@ -151,11 +153,9 @@ class Tracking(TimedAnalysis):
             if objective == "least-voltage":  # without the effort's share
                 smoothed = 1.0 - least.surely / tracked.share if tracked.gears else 0.0
                 least = replace(tracked, doubt=max(least.doubt, smoothed))
-            texts, peaks = list(warnings_of(context, posed, self.intervals, least)), np.zeros(0)
+            texts = list(warnings_of(context, posed, self.intervals, least))
             if tracked.gears:
-                shares = largest_shares(posed.asked, tracked)
-                texts += torques_beyond(model, shares)
-                peaks = shares.peak_times
+                texts += torques_beyond(model, largest_shares(posed.asked, tracked))
             if tracked.unmet > self.tolerance:
                 texts.append(
                     f"between Gauss points modal forces up to {tracked.unmet:.2g} of the largest elastic one are left"
@@ -173,7 +173,8 @@ class Tracking(TimedAnalysis):
         run = at(times)
         around = _with_torques_alone(context, self, run, around)
         statistics = replace(run.statistics, wall_seconds=time.perf_counter() - began, warnings=tuple(texts))
-        return replace(run, details=around, statistics=statistics).with_look(lambda times: at(np.union1d(times, peaks)))
+        run, inside = replace(run, details=around, statistics=statistics), between(tracked.curve.x, MANY)
+        return run.with_look(lambda times: at(with_others(times, inside)))  # torques may have pulses there
 
 
 @struct
