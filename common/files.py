@@ -73,18 +73,17 @@ def check_output(path: Path, file_format: str) -> None:
     An existing file is replaced only where it is no input, and is empty, an HDF5 file whose attribute `format` is
     `file_format`, or one too damaged to tell.
     """
-    _check_no_folder(path, "output")
     check_parent(path)
     replaceable = ("empty", "unreadable", f"HDF5 {file_format}", DAMAGED)
     if path.exists() and not (path.is_file() and kind_of_file(path) in replaceable):  # no device, ever
         raise InputError(
             f'{path}: output: expected a new name or an earlier file of format "{file_format}"',
-            "a file of another kind",
+            "a folder" if path.is_dir() else "a file of another kind",
         )
 
 
 def check_parent(path: Path) -> None:
-    """Raise `InputError` for an output that is an input, or in a folder that does not exist or cannot be written."""
+    """Raise `InputError` for an output that is an input, or whose folder is missing or cannot be written."""
     if not path.parent.is_dir():
         raise InputError(f"{path}: output: expected a file in a folder that exists", f"no folder {path.parent}")
     _check_writable(path, path.resolve().parent)
@@ -100,14 +99,10 @@ def _check_writable(path: Path, folder: Path) -> None:
         raise InputError(f"{path}: output: expected a writable folder, found: {error.strerror or error}") from None
 
 
-def _check_no_folder(path: Path, label: str) -> None:
-    if path.is_dir():
-        raise InputError(f"{path}: {label}: expected a file name", "a folder")
-
-
 def check_ending(path: Path, label: str, endings: Sequence[str]) -> None:
     """Refuse an output that is a folder or an input, or whose name has none of the `endings`. Raises `InputError`."""
-    _check_no_folder(path, label)
+    if path.is_dir():
+        raise InputError(f"{path}: {label}: expected a file name", "a folder")
     if path.suffix.lower() not in endings:
         raise InputError(f"{path}: {label}: expected a name that ends in {either(endings)}", f'"{path.name}"')
     _check_writable(path, path.parent)

@@ -130,7 +130,7 @@ def solve(
     if solution is None:
         click.echo(f"{path}: complete, nothing to go on with")
         return
-    _tell(solution, path, min(len(remarked), 5))  # more leave a summary its room
+    _tell(solution, path, min(len(remarked), 5))  # leaves a summary room
     check_ended(solution, display, again, scene_file)
     for name, result in solution.analyses.items() if strict else ():
         for text in result.warnings:

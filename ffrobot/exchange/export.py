@@ -14,7 +14,7 @@ from ..common.tables import shown
 from ..common.toml_files import read_text
 from ..fe_models.modal_body import ModalBody
 from ..fe_models.modal_body_file import FORMAT, is_modal_body_file, read_modal_body, write_modal_body
-from ..present.lines import plain_table
+from ..present.lines import print_table
 from .bodies.matrices import craig_bampton_file, exudyn_file
 from .bodies.mbdyn import fem_text, read_fem
 from .bodies.sid import read_sid, sid_text
@@ -200,10 +200,9 @@ def print_import(imported: Imported, console: Console) -> None:
         limits = (f"{joint[key]:.4g}" if key in joint else "–" for key in LIMITS)
         rows.append((joint["name"], joint["type"], span, *limits))
     headers = "joint", "type", "range", "moment or force", "speed", "damping", "friction"
-    console.print(plain_table(headers, rows), crop=False)
+    print_table(console, headers, rows)
     if imported.masses:
-        console.print()
-        console.print(plain_table(MASSES, imported.masses), crop=False)
+        print_table(console, MASSES, imported.masses)
         console.out(
             "note       meshes are skins: a filled one has the stiffness of no real casting; links are rigid unless"
             " --flexible names a file",

@@ -40,9 +40,8 @@ def describe(path: Path) -> str:
         with Results(path) as results:
             return _results(results)
     if kind == MODAL_FORMAT:
-        body = read_modal_body(path)
         with open_checked(path) as file:
-            return _modal_body(body) + _datasets([file], MODAL_BODY)
+            return _modal_body(read_modal_body(path)) + _datasets([file], MODAL_BODY)
     raise InputError(f"{path}: expected a modal body file or a results file", f"format {kind!r}")
 
 
@@ -103,9 +102,10 @@ def _results(results: Results) -> str:
     from ..results.tables import loop_cells  # loads the records of scenes
     from .lines import tables_of
 
-    lines = [f"results of scene {results.name!r}, made by ffrobot {results.ffrobot_version}"]
-    for name, body in results.modal_files.items():
-        lines.append(f"body {name}: {body.path} (sha256 {body.sha256[:12]})")
+    lines = [
+        f"results of scene {results.name!r}, made by ffrobot {results.ffrobot_version}",
+        *(f"body {name}: {body.path} (sha256 {body.sha256[:12]})" for name, body in results.modal_files.items()),
+    ]
     analyses = Table("analysis", "kind", "status", "outputs", "up to t (s)", "steps", "evaluations", "wall (s)")
     for name in results.analyses:
         time, about = results.time(name), results.attributes(name)
@@ -136,7 +136,7 @@ def _rendered(table: Table) -> str:
 
 def print_inspection(file: Path, part: "Inspection", density: float | None, console: Console) -> None:
     """Print unit, extent, volume, mass if `density` (kg/m³) is known, and a table of faces, largest first."""
-    from .lines import plain_table  # loads the core
+    from .lines import print_table  # loads the core
 
     said = "" if part.is_declared else ", a guess by its size: --unit sets it"
     size = " × ".join(f"{1000 * value:.6g}" for value in part.high - part.low)
@@ -155,10 +155,7 @@ def print_inspection(file: Path, part: "Inspection", density: float | None, cons
         radius = "–" if face.radius is None else f"{1000 * face.radius:.5g}"
         direction = f"({', '.join(f'{value + 0.0:.4g}' for value in face.direction.round(4))})"
         rows.append((str(k), face.kind, _point(face.center), direction, radius, f"{1e6 * face.area:.5g}"))
-    console.print(
-        plain_table(("face", "kind", "center mm", "normal or axis", "radius mm", "mm² of flat facets"), rows),
-        crop=False,
-    )
+    print_table(console, ("face", "kind", "center mm", "normal or axis", "radius mm", "mm² of flat facets"), rows)
     if (more := len(part.faces) - LISTED) > 0:
         console.print(f"and {more} smaller faces")
 

@@ -156,11 +156,11 @@ def smooth(asked: Transition, tracked: Tracked) -> Tracked:
 
 
 class Shares(NamedTuple):
-    """Largest shares of limits in a motion, with the times `peak_times` (motors,), s, of the largest torques."""
+    """Largest shares of limits in a motion."""
 
     voltage: float  # of `Weights.voltage` where patches have no limits
     torques: Array  # (motors,), no unit, 0 of motors without a limit
-    peak_times: Array
+    peak_times: Array  # (motors,) s, of the largest torques
 
 
 def largest_shares(asked: Transition, tracked: Tracked) -> Shares:
