@@ -166,7 +166,7 @@ def describe_loops(model: Model, t: float, q: Array, v: Array) -> str:
         ),
     ):
         ratio = singular_ratios(of, q[None], np.array([t]), rank)[0]
-        if ratio < NEARLY_SINGULAR:
+        if ratio < 5 * NEARLY_SINGULAR:  # of a run that failed there
             return (
                 f"the configuration is singular or nearly so (ratio of singular values {ratio:.1g}; {what}): a"
                 f" mechanism at a dead center{why} or drive a joint instead"
