@@ -73,11 +73,21 @@ class LinkPatches:
         """Modal forces per volt (n, k), N/(√kg·V), on the modes of the link's file."""
         return self.per_volt[self.body]
 
-    def voltages(self, F_p: Array) -> dict[str, Voltages]:
-        """Voltages by layout for modal forces F_p (T, n), N/√kg; their `unmet`: what all layouts together leave."""
-        forces = np.ascontiguousarray(self.reach.modes.forces(F_p))
-        within = self.allocation(limited=True).solve(forces)
-        return self._by_layout(forces @ voltage_gain(self.reach).T, within, F_p)
+    def voltages(self, F_p: Array, V: Array | None = None) -> dict[str, Voltages]:
+        """Voltages by layout for modal forces F_p (T, n), N/√kg, or given ones V (T, k), V, within limits.
+
+        Their `unmet`: what all layouts together leave.
+        """
+        if V is None:
+            forces = np.ascontiguousarray(self.reach.modes.forces(F_p))
+            V, within = forces @ voltage_gain(self.reach).T, self.allocation(limited=True).solve(forces)
+        else:
+            within = np.clip(V, *self.amplifiers.range)
+        unmet, found = self.unmet(F_p, within), {}
+        for name, array in self.arrays.items():
+            own = np.s_[:, self.columns(name)]
+            found[name] = Voltages(V[own], within[own], array.modes.forces(unmet))
+        return found
 
     @property
     def amplifiers(self) -> Amplifiers:
@@ -96,17 +106,6 @@ class LinkPatches:
     def edges(self) -> Array:
         """Where the patches begin and end, x (k, 2) in m."""
         return np.concatenate([array.edges for array in self.arrays.values()])
-
-    def at_voltages(self, V: Array, F_p: Array) -> dict[str, Voltages]:
-        """Given voltages V (T, k), V, by layout, with the part of forces F_p (T, n), N/√kg, that is unmet."""
-        return self._by_layout(V, np.clip(V, *self.amplifiers.range), F_p)
-
-    def _by_layout(self, required: Array, within: Array, F_p: Array) -> dict[str, Voltages]:
-        unmet, found = self.unmet(F_p, within), {}
-        for name, array in self.arrays.items():
-            own = np.s_[:, self.columns(name)]
-            found[name] = Voltages(required[own], within[own], array.modes.forces(unmet))
-        return found
 
     @property
     def per_volt(self) -> dict[str, Array]:

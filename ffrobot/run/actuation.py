@@ -128,7 +128,7 @@ def find_actuation(scene: Scene, run: Run, bodies: Bodies, patches: "Mapping[str
     analysis, known = run.analysis, run.voltages
     for name, of_link in patches.items():
         F_p = links[name].F_p
-        voltages |= of_link.at_voltages(known[name], F_p) if name in known else of_link.voltages(F_p)
+        voltages |= of_link.voltages(F_p, known.get(name))
     unmet = find_unmet({name: links[name] for name in patches}, patches, voltages, limited=True)
     others = {of.body for of in scene.actuation_points}
     applied = {getattr(one, "apply", None) for one in scene.analysis if one.source == analysis.name}

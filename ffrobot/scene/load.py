@@ -298,7 +298,6 @@ def _guess_problems(scene: SceneKeys) -> Iterator[str]:
 
 def _load_problems(scene: SceneKeys) -> Iterator[str]:
     counts = {layout.label: layout.patch_count for layout in scene.pzt}
-    passive = [layout.label for layout in scene.pzt if not layout.is_driven]
     shunted = [layout.label for layout in scene.pzt if layout.shunt is not None]
     bare = {layout.body for layout in scene.pzt} - {layout.body for layout in scene.pzt if layout.is_driven}
     for analysis in scene.analysis:
@@ -315,7 +314,7 @@ def _load_problems(scene: SceneKeys) -> Iterator[str]:
         if count and number != count:
             of = f'one for each patch of "{load.pzt}"'
             yield f"load no. {k}: voltage: expected {count} expressions, {of}, found {number}"
-        if load.pzt in passive:
+        if any(layout.label == load.pzt and not layout.is_driven for layout in scene.pzt):
             yield f'load no. {k}: pzt: expected patches {DRIVEN}, found "{load.pzt}"'
         joint = joints.get(load.joint or "")
         if joint is None or not _moves(joint):

@@ -111,9 +111,8 @@ def cause_of(inversion: Inversion) -> str:
         k = linear.singular_after[0]
         return f"singular coupling between t = {linear.times[k]:.4g} and {linear.times[k + 1]:.4g} s, {INFINITE}"
     if is_coarse or not len(changed):
-        return "; ".join(
-            [*inversion.servo.model.sticking, f"{ADVICE[inversion.status]} (worst at t = {inversion.worst:.4g} s)"]
-        )
+        texts = *inversion.servo.model.sticking, ADVICE[inversion.status]
+        return f"{'; '.join(texts)} (worst at t = {inversion.worst:.4g} s)"
     k = int(changed[0])
     return (
         f"zeros change sides along the path: {count[0]} of them are in the right half plane at t = 0, {count[k]} at t"

@@ -47,11 +47,6 @@ class Rule(NamedTuple):
     # in short runs, how many times as slow as DOP853 Radau is expected to be, which takes over where that is wrong
     last_resort: float = 100.0
 
-    def cost_of_radau(self, coordinates: int, replay: float) -> float:
-        """Cost of a Radau step in DOP853 steps; `replay`: time to find replayed inputs, in evaluations."""
-        one = 1.0 + replay
-        return (self.of_radau * one + self.of_algebra * coordinates) / (self.of_dop853 * one)
-
 
 RULE = Rule()
 
@@ -246,7 +241,7 @@ def choose_integrator(
     if replayed is not None and replayed.integrator in (*EXPLICIT, "radau"):
         return Choice(replayed.integrator, "integrator of the run whose forces act")
     replay = 0.0 if replayed is None else replayed.evaluations
-    cost = RULE.cost_of_radau(model.tree.n_v, replay)
+    cost = (RULE.of_radau + RULE.of_algebra * model.tree.n_v / (1.0 + replay)) / RULE.of_dop853
     choice = None if model.tree.gears else without_choosing(_of_links(model), float(np.ptp(times)), replay, cost)
     if choice is not None:
         return choice if replayed is None else choice._replace(candidates=())

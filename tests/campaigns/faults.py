@@ -62,7 +62,7 @@ FAULTS = [
           "modulus * d31", "tests/actuation/test_patches.py"),
     Fault(PATCHES + "records.py", "s * c**3 - (2 * S_22",
           "s * c**3 + (2 * S_22", "tests/actuation/test_patched_links_3d.py"),
-    Fault(PATCHES + "link_patches.py", "_by_layout(forces @", "_by_layout(2.0 * forces @", PATCHED),
+    Fault(PATCHES + "link_patches.py", "V, within = forces @", "V, within = 2.0 * forces @", PATCHED),
     Fault("actuation/control/controllers.py", "np.eye(len(R)) + B.T @ X @ B, B.T",
           "np.eye(len(R)), B.T", "tests/actuation/test_kalman.py"),
     Fault("actuation/control/margins.py", 'record.rate == "measured"',

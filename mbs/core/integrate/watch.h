@@ -41,8 +41,7 @@ private:
 
   // A step size that collapses never quite reaches rounding where noise feeds its estimates. Nothing that the equations
   // describe asks for a thousand steps in a row so much shorter, in the mean, than the first one to try, a tenth of the
-  // fastest vibration's radian. Where nothing vibrates that is a part of the run, of which the motion may be a brief
-  // one.
+  // fastest vibration's radian. Where nothing vibrates that is a part of the run.
   static constexpr double shortest_steps = 1e-5;
 
   // The clock is looked at after one step, two, four and so on while that takes next to no time.
