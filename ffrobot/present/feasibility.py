@@ -126,7 +126,7 @@ def _patches(body: str, pzt: h5py.Group, judged: h5py.Group) -> Table:
 
 def _remedy_line(judged: h5py.Group) -> str:
     if np.all(judged["factor"][()] <= 1.0):
-        return f"the patches can do it; a limit of {_number(judged['remedies'].attrs['limit'])} V is sufficient"
+        return f"voltages are within limits: at most {_number(judged['remedies'].attrs['limit'])} V"
     remedies = judged["remedies"].attrs
     if np.isinf(remedies["limit"]):
         return f"needs {FASTER}"
