@@ -187,19 +187,21 @@ def largest_displacement(link: ModalBody, p: Array) -> float:
 
 
 def _largest(p: Array, shapes: Array) -> float:
-    """Largest length over p (T, n) of what moves by `shapes` (k, axes, n)."""
-    return float(largest_lengths(p, shapes).max(initial=0.0))
+    """Return the largest |shape · p|, m or rad, of k `shapes` (k, axes, n) over p (T, n), √kg·m.
 
-
-def largest_lengths(p: Array, shapes: Array) -> Array:
-    """The largest |shape · p| (T,), m or rad, of k `shapes` (k, axes, n) at p (T, n), √kg·m.
-
-    One after the other: all at once may not fit into memory.
+    Of most p a bound, Σ |p_j| max|shape_j|, is below the length at its own maximum: these are left out.
     """
-    squares = np.zeros(len(p))
-    for shape in shapes:
-        np.maximum(squares, ((shape @ p.T) ** 2).sum(axis=0), out=squares)
-    return np.sqrt(squares)
+    if not len(p):
+        return 0.0
+    bounds = np.abs(p) @ np.linalg.norm(shapes, axis=1).max(axis=0)
+    known = _largest_at(p[[bounds.argmax()]], shapes)
+    return max(known, _largest_at(p[bounds > known], shapes))
+
+
+def _largest_at(p: Array, shapes: Array) -> float:
+    """One shape after the other: all at once may not fit into memory."""
+    squares = [((shape @ p.T) ** 2).sum(axis=0).max(initial=0.0) for shape in shapes]
+    return float(np.sqrt(np.max(squares)))
 
 
 NOTABLE_STIFFNESS_CHANGE = 0.01  # relative, of a link, from which on "auto" switches geometric stiffening on
@@ -300,8 +302,7 @@ def _bending_of(run: Run, name: str, link: ModalBody, sizes: Mapping[str, Array]
         parts = [sizes[load] for axis in "xyz" if (load := f"force/{point}/{axis}") in sizes]
         force = np.maximum(force, np.linalg.norm(parts, axis=0)) if parts else force
     deflection, rotation, shortening = shape_from_chord(link, p)
-    peaks = (deflection / link.length, rotation, shortening, force * shortening)
-    w, phi, s, moment = (float(x.max(initial=0.0)) for x in peaks)
+    s, moment = (float(x.max(initial=0.0)) for x in (shortening, force * shortening))
     unknown = 0.0 if link.geometric_stiffness or not body.n_modes else np.nan
     change, buckling, missing = unknown, 0.0, Missing(unknown, unknown)
     if body.n_modes and link.geometric_stiffness:
@@ -312,8 +313,8 @@ def _bending_of(run: Run, name: str, link: ModalBody, sizes: Mapping[str, Array]
         else:
             missing = missing_to_first_order(link, T, own, on_modes, is_at_rest=run.is_at_rest)
     return Bending(
-        deflection=w,
-        rotation=phi,
+        deflection=deflection / link.length,
+        rotation=rotation,
         foreshortening=s,
         foreshortening_moment=moment,
         stiffness_change=change,
@@ -352,10 +353,10 @@ def _on_modes(link: ModalBody, run: Run, node: Node, sizes: Mapping[str, Array])
     return ModalLoads(f, K_known, node.body.stiffness, tuple(points.values()), support)
 
 
-def shape_from_chord(link: ModalBody, p: Array) -> tuple[Array, Array, Array]:
-    """Largest deflection (m), section rotation (rad) from the chord, foreshortening (m), (T,), at p (T, n).
+def shape_from_chord(link: ModalBody, p: Array) -> tuple[float, float, Array]:
+    """Return the largest deflection (m) and section rotation (rad) from the chord, and foreshortening (T,), m.
 
-    p: √kg·m, of the file. Slopes along y and z: v' = φ_z, w' = −φ_y.
+    At p (T, n), √kg·m, of the file. Slopes along y and z: v' = φ_z, w' = −φ_y.
     """
     stations, x = link.stations, link.stations.position[:, 0]
     shares = 0.5 * (np.append(np.diff(x), 0.0) + np.append(0.0, np.diff(x)))  # of the length, by the trapezoidal rule
@@ -363,7 +364,7 @@ def shape_from_chord(link: ModalBody, p: Array) -> tuple[Array, Array, Array]:
     chord = (across[-1] - across[0]) / (x[-1] - x[0])
     off = across - across[0] - (x - x[0])[:, None, None] * chord
     G = np.einsum("k,kan,kam->nm", shares, slopes, slopes)
-    return largest_lengths(p, off), largest_lengths(p, slopes - chord), 0.5 * ((p @ G) * p).sum(axis=1)
+    return _largest(p, off), _largest(p, slopes - chord), 0.5 * ((p @ G) * p).sum(axis=1)
 
 
 def largest(bodies: Mapping[str, Bending]) -> tuple[str, Bending] | None:
