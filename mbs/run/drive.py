@@ -281,7 +281,7 @@ class _Integration:
         """The motion with what a replay does (T, numbers) on joints and points."""
         if (drives := self.drives.replayed) is None or not len(motion.time):
             return motion
-        acting = spline(motion.time, replayed, 1)
+        acting = spline(motion.time, replayed, 1) if drives.at_points else []
         applied = (
             PointDrive(point, {component: acting[number] for component, number in of_point.items()})
             for point, of_point in drives.at_points.items()
