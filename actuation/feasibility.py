@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..common.arrays import Array, Indices
+from ..common.peaks import largest_below
 from ..common.structs import struct
 from ..fe_models.modal_body import ModalBody
 from ..mbs.model.body import Body
@@ -356,7 +357,9 @@ def _largest_voltage(run: Run, link: LinkInMotion, layout: "PztLayout", count: i
         return None
     if link.spatial.name in run.model.tree.index:  # else in pieces, with all modes
         patches = on_kept_modes(patches, node_of(run, link.spatial.name).body)
-    return float(np.abs(patches.reach.modes.forces(link.F_p) @ voltage_gain(patches.reach).T).max())
+    forces, gain = patches.reach.modes.forces, voltage_gain(patches.reach)
+    bounds = np.abs(link.F_p) @ np.abs(forces(np.eye(link.F_p.shape[1])) @ gain.T).max(axis=1)
+    return largest_below(bounds, lambda rows: float(np.abs(forces(link.F_p[rows]) @ gain.T).max(initial=0.0)))
 
 
 def find_unmet(

@@ -1,8 +1,10 @@
 """Largest values and root mean squares of what is known at some times, between these times too."""
 
+from collections.abc import Callable
+
 import numpy as np
 
-from .arrays import Array
+from .arrays import Array, Indices
 
 ALIKE = 4.0  # ratio of curvatures about a value within which it is the top of something smooth
 
@@ -14,6 +16,14 @@ def largest(time: Array, values: Array) -> tuple[float, float]:
     value itself. Without values 0 and NaN.
     """
     return top_at(time, values, int(np.abs(values).argmax())) if len(values) else (0.0, float("nan"))
+
+
+def largest_below(bounds: Array, largest_of: Callable[[Indices], float]) -> float:
+    """Return the largest of values below `bounds` (T,), any unit, by `largest_of` those that may be it; 0 of none."""
+    if not len(bounds):
+        return 0.0
+    known = largest_of(bounds.argmax(keepdims=True))
+    return max(known, largest_of(np.flatnonzero(bounds > known)))
 
 
 def top_at(time: Array, values: Array, k: int) -> tuple[float, float]:

@@ -16,7 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array
+from ...common.arrays import Array, Indices
+from ...common.peaks import largest_below
 from ...common.structs import struct
 from ...fe_models.modal_body import ModalBody
 from ...fe_models.modal_body.unit_loads import interface_load_names
@@ -187,21 +188,13 @@ def largest_displacement(link: ModalBody, p: Array) -> float:
 
 
 def _largest(p: Array, shapes: Array) -> float:
-    """Return the largest |shape · p|, m or rad, of k `shapes` (k, axes, n) over p (T, n), √kg·m.
+    """Return the largest |shape · p|, m or rad, of k `shapes` (k, axes, n) over p (T, n), √kg·m."""
 
-    Of most p a bound, Σ |p_j| max|shape_j|, is below the length at its own maximum: these are left out.
-    """
-    if not len(p):
-        return 0.0
-    bounds = np.abs(p) @ np.linalg.norm(shapes, axis=1).max(axis=0)
-    known = _largest_at(p[[bounds.argmax()]], shapes)
-    return max(known, _largest_at(p[bounds > known], shapes))
+    def largest_of(rows: Indices) -> float:  # one shape after the other: all at once may not fit into memory
+        at = p[rows].T
+        return float(np.sqrt(np.max([((shape @ at) ** 2).sum(axis=0).max(initial=0.0) for shape in shapes])))
 
-
-def _largest_at(p: Array, shapes: Array) -> float:
-    """One shape after the other: all at once may not fit into memory."""
-    squares = [((shape @ p.T) ** 2).sum(axis=0).max(initial=0.0) for shape in shapes]
-    return float(np.sqrt(np.max(squares)))
+    return largest_below(np.abs(p) @ np.linalg.norm(shapes, axis=1).max(axis=0), largest_of)
 
 
 NOTABLE_STIFFNESS_CHANGE = 0.01  # relative, of a link, from which on "auto" switches geometric stiffening on
