@@ -18,7 +18,7 @@ import numpy as np
 
 from ...common.arrays import Array, Indices
 from ...common.peaks import largest_below
-from ...common.structs import struct
+from ...common.structs import kept, struct
 from ...fe_models.modal_body import ModalBody
 from ...fe_models.modal_body.unit_loads import interface_load_names
 from ..model.nodes import Node
@@ -79,6 +79,7 @@ def lasting(loads: ModalLoads, time: Array) -> ModalLoads:
     return replace(loads, f=(last - first) / (2 * half))
 
 
+@kept
 def stiffness_change(loads: ModalLoads) -> tuple[float, float]:
     """The largest relative change |μ| of stiffness by the loads of a run, and −μ of the lowest μ.
 
