@@ -220,7 +220,7 @@ class _Integration:
     def motion(self, run: _core.TreeRun, times: Array) -> Run:
         """The motion in a run of the core at `times` (T,), s, as far as it got."""
         model = self.system.model
-        q, v = (np.ascontiguousarray(part) for part in np.split(run.states, [model.tree.n_q], axis=1))
+        q, v = np.split(run.states, [model.tree.n_q], axis=1)
         return Run(
             analysis=self.analysis,
             model=model,
@@ -306,7 +306,7 @@ class _Integration:
             ends = np.append(ends, both)
 
         def at(rows: Indices) -> _core.TreeRun:
-            chosen, of_rows = times[rows].tolist(), np.ascontiguousarray(states[rows])
+            chosen, of_rows = times[rows].tolist(), states if len(rows) == len(times) else states[rows]
             if control is None:
                 return _core.tree_outputs(core, scene, chosen, of_rows, self.system.replay)
             held = zero_order_hold(self.system.model, control.commands)

@@ -222,7 +222,14 @@ class Run:
 
     def with_rows_of(self, other: "Run", order: Indices) -> Self:
         """Return the run with outputs of `other`, at other times of the same motion, appended, then put in `order`."""
-        return self._each(lambda x, y: np.concatenate([x, y])[order], other)
+        is_own = order < len(self.time)
+
+        def merged(x: Array, y: Array) -> Array:
+            rows = y[np.maximum(order - len(x), 0)]
+            rows[is_own] = x[order[is_own]]
+            return rows
+
+        return self._each(merged, other)
 
     def after(self, earlier: "Run") -> Self:
         """The run with the earlier part of the same motion in front."""
