@@ -176,7 +176,8 @@ template <class Space> void bind_kinematics(nb::class_<Model<Space>> model) {
           "frames",
           [](Model<Space> &model, const VectorXd &q, const VectorXd &v) {
             model.check_state(q, v);
-            return frame_motions(q.data(), v.data(), model.w);
+            place_all(q.data(), v.data(), nullptr, model.w);
+            return frame_motions(model.w);
           },
           "q"_a, "v"_a, "Motion of all frames, accelerations those of the last evaluation.")
       .def(
@@ -242,7 +243,7 @@ template <class Space> void bind_forces(nb::class_<Model<Space>> model) {
   model
       .def(
           "without_work",
-          [](Model<Space> &model, const RowMajor &q, const RowMajor &forces) {
+          [](Model<Space> &model, const Rows &q, const Rows &forces) {
             check_size("forces", forces.rows(), q.rows()), check_size("q", q.cols(), model.mechanism.n_q);
             check_size("forces", forces.cols(), Space::dim * model.mechanism.nodes.size());
             return without_work(q, forces, model.w);

@@ -1,6 +1,5 @@
 """Forces of known motions in 3D by the core's recursive Newton–Euler algorithm. SI units."""
 
-from functools import cached_property
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -102,17 +101,20 @@ class MotionForces:
         """The wrench of constraint equation `number` on its section b; 0 for joint coordinates."""
         return _wrench(self.found.constraints, 2 * number + 1)
 
-    @cached_property
-    def at_points(self) -> list[list[tuple[Section, Wrench]]]:
-        """Return, by body of the tree, all wrenches at its points and frame, with their sections."""
-        wrenches: list[list[tuple[Section, Wrench]]] = [[] for _ in self.system.model.tree.nodes]
-        for number, section in enumerate(self.system.sections):
-            wrenches[section.body].append((section, _wrench(self.found.sections, number)))
-        return wrenches
+    def on_sections(self, body: int) -> tuple[list[Section], Array]:
+        """Return the sections of body no. `body`, and (T, 2 sections, 3) force and moment on each, with its joints'."""
+        sections = self.system.sections
+        numbers = [number for number, section in enumerate(sections) if section.body == body]
+        first, end = numbers[0], numbers[-1] + 1
+        return sections[first:end], self.found.sections[:, 6 * first : 6 * end].reshape(-1, 2 * (end - first), 3)
 
     def of_body(self, number: int) -> SectionMotion:
         """The accelerations of the frame of body no. `number`."""
         return _motion(self.found.bodies, number)
+
+    def axes(self, number: int) -> Array:
+        """Return the axes (T, 3, 3) of the frame of body no. `number`."""
+        return self.found.axes[:, 9 * number : 9 * number + 9].reshape(-1, 3, 3)
 
     def of_point(self, point: str) -> SectionMotion:
         """The accelerations of the section "BODY.POINT", on which a drive of the system must act."""

@@ -4,7 +4,7 @@ Forces in joints are by Newton and Euler, in the core (docs/theory.md, Stresses)
 so in place of the forces along its trajectories: loops then transmit their share of M v̇ − Q (`split_forces`).
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,13 +12,13 @@ import numpy as np
 from ...common.arrays import Array
 from ...fe_models.modal_body.unit_loads import PAIRS, interface_load_names
 from ..fields.field_types import split_point
-from ..model.known_motion import MotionForces, Wrench, motion_forces, required_forces
+from ..model.known_motion import MotionForces, motion_forces, required_forces
 from ..model.masses import turns_as_a_body
 from ..model.nodes import Section
 from ..model.system import MultibodySystem, split_forces
 from ..run.record import Run
 from ..scene.bodies import tensor
-from .motion import acting_forces, places, system_of
+from .motion import acting_forces, system_of
 from .supply import behind_gears
 
 
@@ -54,8 +54,8 @@ def _link_loads(run: Run, bodies: Iterable[str], forces: MotionForces) -> dict[s
     tree, gravity, loads = run.model.tree, np.array(run.model.scene.gravity), {}
     for name in bodies:
         number = tree.index[name]
-        node, F = tree.nodes[number], places(run).frame(number).F
-        at_points = _at_points(F, forces.at_points[number])
+        node, F = tree.nodes[number], forces.axes(number)
+        at_points = _at_points(F, *forces.on_sections(number))
         left = forces.found.modal[:, node.p_v].copy()
         for point, wrench in at_points.items():
             at = node.body.points[point]
@@ -78,17 +78,16 @@ def _link_loads(run: Run, bodies: Iterable[str], forces: MotionForces) -> dict[s
     return loads
 
 
-def _at_points(F: Array, acting: Iterable[tuple[Section, Wrench]]) -> dict[str, Array]:
+def _at_points(F: Array, sections: Sequence[Section], wrenches: Array) -> dict[str, Array]:
     """(T, 6) by point, in axes of the body F (T, 3, 3); without what turns its frame and not the section."""
-    wrenches = dict[str, Array]()
-    for section, wrench in acting:
+    of_points = dict[str, Array]()
+    for section, own in zip(sections, np.split(wrenches @ F, len(sections), axis=1), strict=True):
         if section.point:
-            force, moment = np.hsplit(_in_axes_of(F, wrench), 2)
-            own = np.hstack([force, section.turned(moment[..., None])[..., 0]])
-            wrenches[section.point] = wrenches.get(section.point, 0.0) + own
-    return wrenches
+            own[:, 1] = section.turned(own[:, 1, :, None])[..., 0]
+            of_points[section.point] = of_points.get(section.point, 0.0) + own.reshape(-1, 6)
+    return of_points
 
 
 def _in_axes_of(F: Array, vectors: Iterable[Array]) -> Array:
     """Vectors (T, 3) side by side, from global axes to those of a triad F (T, 3, 3)."""
-    return np.hstack([np.einsum("tji,tj->ti", F, x) for x in vectors])
+    return (np.stack(tuple(vectors), axis=1) @ F).reshape(len(F), -1)

@@ -18,6 +18,7 @@ from random_mechanisms import TYPES, random_tree
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.model.gears import with_compliance
+from ffrobot.mbs.model.known_motion import Wrench
 from ffrobot.mbs.quantities.motion import acting_forces, system_of
 from ffrobot.mbs.quantities.supply import totals
 
@@ -87,9 +88,10 @@ def check_points(motion):
     of_all = accelerations_of_bodies(state)
     for number, (node, expected) in enumerate(zip(tree.nodes, of_bodies, strict=True)):
         force, moment, frame = 0.0, 0.0, state.frames[number]
-        for section, acting in acting_forces(motion).at_points[number]:
+        sections, wrenches = acting_forces(motion).on_sections(number)
+        for k, section in enumerate(sections):
             place = tree_oracle.motion(tree, section, motion.q, state.frames)
-            at_frame = acting.seen_from(place.r - frame.r)
+            at_frame = Wrench(*wrenches[:, 2 * k : 2 * k + 2].swapaxes(0, 1)).seen_from(place.r - frame.r)
             force, moment = force + at_frame.force, moment + at_frame.moment
         wrench, modal = expected[:, :6], expected[:, 6:]
         size = np.abs(wrench[:, :3]).max() + np.abs(wrench[:, 3:]).max()

@@ -31,6 +31,7 @@ void bind_motions_and_forces(nb::module_ &m) {
       "Forces between bodies and in joints over states (T, …), N, with moments about the sections on which they act, "
       "N m, global axes; mbs/core/recursion/inverse/motion_forces.h.")
       .def_ro("bodies", &MotionForces::bodies, "(T, 9 bodies) acceleration, angular acceleration, angular velocity.")
+      .def_ro("axes", &MotionForces::axes, "(T, 9 bodies) of the frames of bodies, row by row.")
       .def_ro("points", &MotionForces::points, "(T, 9 wrenches) the same of sections on which wrenches may act.")
       .def_ro("sections", &MotionForces::sections, "(T, dim sections) sum on each of the model's sections.")
       .def_ro("joints", &MotionForces::joints, "(T, dim bodies) of the joint of each body on its outer section.")

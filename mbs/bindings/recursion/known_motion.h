@@ -11,7 +11,7 @@ namespace ffrobot::recursion {
 // q (T, n_q), v and a (T, n_v) at times (T)
 struct KnownStates {
   const std::vector<double> &times;
-  const RowMajor &q, &v, &a;
+  const Rows &q, &v, &a;
 };
 
 // each(i, what acts, forces, workspace) at state i, after accelerate(); nothing acts along coordinates of `forces`
@@ -22,7 +22,7 @@ void at_known_states(Model<Space> &model, const Scene &scene, const KnownStates 
   check_scene(model, scene);
   const Index columns[] = {model.mechanism.n_q, model.mechanism.n_v, model.mechanism.n_v};
   for (const int k : {0, 1, 2}) {
-    const RowMajor &of = k == 0 ? q : k == 1 ? v : a;
+    const Rows &of = k == 0 ? q : k == 1 ? v : a;
     check_size("states", of.rows(), count), check_size("coordinates", of.cols(), columns[k]);
   }
   if (count == 0)
@@ -42,15 +42,15 @@ void at_known_states(Model<Space> &model, const Scene &scene, const KnownStates 
 }
 
 // Multipliers (T, rows) of `states`
-inline void check_multipliers(const RowMajor &multipliers, Index states, Index rows) {
+inline void check_multipliers(const Rows &multipliers, Index states, Index rows) {
   check_size("times of multipliers", multipliers.rows(), states);
   check_size("multipliers", multipliers.cols(), rows);
 }
 
 // (T, n_v) M a - Q, with Q of gravity, elasticity, damping and all forces of the scene
 template <class Space>
-RowMajor required_forces(Model<Space> &model, const Scene &scene, const std::vector<double> &times, const RowMajor &q,
-                         const RowMajor &v, const RowMajor &a) {
+RowMajor required_forces(Model<Space> &model, const Scene &scene, const std::vector<double> &times, const Rows &q,
+                         const Rows &v, const Rows &a) {
   RowMajor found(a.rows(), a.cols());
   at_known_states(model, scene, {times, q, v, a}, [&](Index i, const auto &acting, auto &forces, auto &w) {
     forces.load(nullptr, acting.wrench, w);
@@ -64,7 +64,7 @@ RowMajor required_forces(Model<Space> &model, const Scene &scene, const std::vec
 // (T, rows) second derivatives of the rows' values, less those that their targets have
 template <class Space>
 RowMajor constraint_accelerations(Model<Space> &model, const Scene &scene, const std::vector<double> &times,
-                                  const RowMajor &q, const RowMajor &v, const RowMajor &a) {
+                                  const Rows &q, const Rows &v, const Rows &a) {
   RowMajor found(a.rows(), model.rows());
   at_known_states(model, scene, {times, q, v, a}, [&](Index i, const auto &, auto &forces, auto &w) {
     for (std::size_t r = 0; r < scene.targets.size(); ++r)
@@ -75,22 +75,22 @@ RowMajor constraint_accelerations(Model<Space> &model, const Scene &scene, const
 
 // What bodies and joints do to each other, under multipliers (T, rows) and the forces of the scene
 template <class Space>
-MotionForces motion_forces(Model<Space> &model, const Scene &scene, const std::vector<double> &times, const RowMajor &q,
-                           const RowMajor &v, const RowMajor &a, const RowMajor &multipliers) {
+MotionForces motion_forces(Model<Space> &model, const Scene &scene, const std::vector<double> &times, const Rows &q,
+                           const Rows &v, const Rows &a, const Rows &multipliers) {
   check_multipliers(multipliers, a.rows(), model.rows());
   ForcesOfStates<Space> found(model.mechanism, a.rows());
   at_known_states(model, scene, {times, q, v, a}, [&](Index i, const auto &acting, auto &forces, auto &w) {
     const double *lambda = multipliers.row(i).data();
     forces.load(lambda, acting.wrench, w);
-    found.write(i, q.row(i).data(), v.row(i).data(), a.row(i).data(), lambda, acting.wrench, forces, w);
+    found.write(i, q.row(i).data(), a.row(i).data(), lambda, acting.wrench, forces, w);
   });
   return found.found();
 }
 
 // Joints and constraints alone, under multipliers (T, rows) alone
 template <class Space>
-MotionForces multiplier_forces(Model<Space> &model, const Scene &scene, const std::vector<double> &times,
-                               const RowMajor &q, const RowMajor &multipliers) {
+MotionForces multiplier_forces(Model<Space> &model, const Scene &scene, const std::vector<double> &times, const Rows &q,
+                               const Rows &multipliers) {
   check_multipliers(multipliers, q.rows(), model.rows());
   const RowMajor still = RowMajor::Zero(q.rows(), model.mechanism.n_v);
   ForcesOfStates<Space> found(model.mechanism, q.rows());

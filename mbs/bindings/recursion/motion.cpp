@@ -36,8 +36,8 @@ TreeRun motion_of(const Model<Space> &model, const Scene &scene, const std::vect
 }
 
 template <class Space>
-TreeRun outputs_of(const Model<Space> &model, const Scene &scene, const std::vector<double> &times,
-                   const RowMajor &states, Replay *replay) {
+TreeRun outputs_of(const Model<Space> &model, const Scene &scene, const std::vector<double> &times, const Rows &states,
+                   Replay *replay) {
   if (replay)
     check_replay(model, *replay);
   return outputs_at(model, scene, times, states, nullptr, replay, [](Index) {});

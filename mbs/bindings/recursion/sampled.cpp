@@ -43,7 +43,7 @@ TreeRun sampled_motion_of(const Model<Space> &model, const Scene &scene, const s
 
 template <class Space>
 TreeRun outputs_under_hold(const Model<Space> &model, const Scene &scene, const std::vector<double> &times,
-                           const RowMajor &states, ZeroOrderHold held, const RowMajor &commands) {
+                           const Rows &states, ZeroOrderHold held, const Rows &commands) {
   check_hold(model, held);
   check_size("commands", commands.rows(), states.rows());
   check_size("inputs", commands.cols(), held.direction().cols());

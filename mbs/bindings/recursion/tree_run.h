@@ -123,8 +123,8 @@ struct TreeRun : IntegrationReport, PostureHistory { // of the scene's watch
 
 // What a run reports of states (T, n_q + n_v) that are known; act(i) before each, has `held` act as it does there.
 template <class Space, class Act>
-TreeRun outputs_at(const Model<Space> &model, const Scene &scene, const std::vector<double> &times,
-                   const RowMajor &states, const ZeroOrderHold *held, Replay *replay, const Act &act) {
+TreeRun outputs_at(const Model<Space> &model, const Scene &scene, const std::vector<double> &times, const Rows &states,
+                   const ZeroOrderHold *held, Replay *replay, const Act &act) {
   check_scene(model, scene);
   check_size("states", states.cols(), model.mechanism.n_q + model.mechanism.n_v);
   check_size("times", times.size(), states.rows());

@@ -108,11 +108,11 @@ const std::vector<double> &ForwardMotion::outputs() {
   const double *q = y_.data(), *v = q + mechanism_.n_q;
   VectorXd a(mechanism_.n_v);
   motion_->evaluate(0, q, v, a.data());
-  const auto frames = frame_motions(q, v, motion_->workspace());
+  place_all(q, v, nullptr, motion_->workspace());
+  const auto frames = frame_motions(motion_->workspace());
   for (const PlaceOutput &output : model_.places) {
     const std::size_t number = output.body;
     const auto &node = mechanism_.nodes[number];
-    const auto &body = model_.bodies[number];
     Vector3d x = output.position;
     if (node.n()) {
       const auto p = y_.segment(node.p_q(), node.n());
@@ -120,9 +120,7 @@ const std::vector<double> &ForwardMotion::outputs() {
       for (std::size_t l = 0; l < output.K.size(); ++l)
         x[l] -= 0.5 * p.dot(output.K[l] * p);
     }
-    if (node.inboard < 0) // the frame sits at the joint, with the axes of its triad
-      x = node.origin + body.data.markers[body.inboard_marker].triad.transpose() * x;
-    x = frames[number].r + frames[number].R * x;
+    x = frames[number].r + frames[number].R * (node.origin + node.axes * x);
     std::copy_n(x.data(), 3, outputs_.data() + i);
     i += 3;
   }

@@ -8,6 +8,7 @@ namespace ffrobot::recursion {
 namespace {
 
 using Motion = Map<Matrix<double, 9, 1>>;
+using Axes = Map<Matrix<double, 3, 3, Eigen::RowMajor>>;
 
 double *block(RowMajor &table, Index row, Index size, std::size_t number) {
   return table.row(row).data() + size * number;
@@ -45,7 +46,7 @@ ForcesOfStates<Space>::ForcesOfStates(const Mechanism<Space> &mechanism, Index s
     table.setZero(states, size * count);
   };
   const std::size_t bodies = mechanism.nodes.size(), wrenches = mechanism.wrenches.size();
-  resize(found_.bodies, 9, bodies), resize(found_.points, 9, wrenches);
+  resize(found_.bodies, 9, bodies), resize(found_.axes, 9, bodies), resize(found_.points, 9, wrenches);
   resize(found_.sections, Space::dim, sections(mechanism).size()), resize(found_.joints, Space::dim, bodies);
   resize(found_.constraints, 2 * Space::dim, mechanism.constraints.size()),
       resize(found_.wrenches, Space::dim, wrenches);
@@ -57,6 +58,11 @@ void ForcesOfStates<Space>::write_loads(Index i, const double *lambda, NewtonEul
                                         const Workspace<Space, double> &w) {
   forces.transmit(w, false);
   write_joints(i, forces, w);
+  write_constraints(i, lambda, w);
+}
+
+template <class Space>
+void ForcesOfStates<Space>::write_constraints(Index i, const double *lambda, const Workspace<Space, double> &w) {
   ConstraintMotion<double> motion;
   for (std::size_t r = 0; r < mechanism_.constraints.size(); ++r) {
     constraint_motion(mechanism_.constraints[r], w, mechanism_.constraints[r].moves, motion);
@@ -67,9 +73,9 @@ void ForcesOfStates<Space>::write_loads(Index i, const double *lambda, NewtonEul
 }
 
 template <class Space>
-void ForcesOfStates<Space>::write(Index i, const double *q, const double *v, const double *a, const double *lambda,
-                                  const double *wrench, NewtonEuler<Space> &forces, Workspace<Space, double> &w) {
-  write_loads(i, lambda, forces, w);
+void ForcesOfStates<Space>::write(Index i, const double *q, const double *a, const double *lambda, const double *wrench,
+                                  NewtonEuler<Space> &forces, Workspace<Space, double> &w) {
+  write_constraints(i, lambda, w);
   forces.transmit(w);
   write_joints(i, forces, w);
   write_sections(i, forces, w);
@@ -79,9 +85,11 @@ void ForcesOfStates<Space>::write(Index i, const double *q, const double *v, con
     std::copy_n(wrench, found_.wrenches.cols(), found_.wrenches.row(i).data());
   forces.require_of_modes(q, a, w, found_.modal.row(i).data());
   forces.leave_frames(w);
-  const std::vector<FrameMotion> frames = frame_motions(q, v, w);
-  for (std::size_t k = 0; k < frames.size(); ++k)
+  const std::vector<FrameMotion> frames = frame_motions(w);
+  for (std::size_t k = 0; k < frames.size(); ++k) {
     Motion(block(found_.bodies, i, 9, k)) << frames[k].a_origin, frames[k].alpha, frames[k].omega;
+    Axes(block(found_.axes, i, 9, k)) = frames[k].R * mechanism_.nodes[k].axes;
+  }
 }
 
 template <class Space>

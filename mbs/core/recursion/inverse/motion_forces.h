@@ -9,6 +9,7 @@ namespace ffrobot::recursion {
 // (x, y, moment) in the plane, (x, y, z, mx, my, mz) in space.
 struct MotionForces {
   RowMajor bodies;      // 9 of each: acceleration and angular acceleration of its data's origin, angular velocity
+  RowMajor axes;        // 9 of each: of its data, row by row
   RowMajor points;      // 9 of each section on which a wrench may act: the same
   RowMajor sections;    // of each section of bodies where joints, constraints or wrenches are: all that acts there
   RowMajor joints;      // of each body: what its joint does to its outer section
@@ -24,18 +25,19 @@ public:
 
   // Row i, after prepare() without generalized forces, accelerate() and load() of lambda (constraints) and of `wrench`
   // (wrenches, dim; may be null)
-  void write(Index i, const double *q, const double *v, const double *a, const double *lambda, const double *wrench,
+  void write(Index i, const double *q, const double *a, const double *lambda, const double *wrench,
              NewtonEuler<Space> &forces, Workspace<Space, double> &w);
 
   // Joints and constraints of row i: what lambda does by itself, after load() of it
   void write_loads(Index i, const double *lambda, NewtonEuler<Space> &forces, const Workspace<Space, double> &w);
 
-  const MotionForces &found() const { return found_; }
+  MotionForces &&found() { return std::move(found_); }
 
   // Of each column block of `sections`: body, and marker of its data
   static std::vector<std::array<int, 2>> sections(const Mechanism<Space> &mechanism);
 
 private:
+  void write_constraints(Index i, const double *lambda, const Workspace<Space, double> &w);
   void write_joints(Index i, const NewtonEuler<Space> &forces, const Workspace<Space, double> &w);
   void write_sections(Index i, const NewtonEuler<Space> &forces, const Workspace<Space, double> &w);
   void write_point(const Attachment &at, const NewtonEuler<Space> &forces, const Workspace<Space, double> &w,

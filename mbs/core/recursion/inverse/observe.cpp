@@ -86,9 +86,7 @@ void write_motion(const Pose<double> &of, double *to) {
 
 } // namespace
 
-template <class Space>
-std::vector<FrameMotion> frame_motions(const double *q, const double *v, Workspace<Space, double> &w) {
-  place_all(q, v, nullptr, w);
+template <class Space> std::vector<FrameMotion> frame_motions(const Workspace<Space, double> &w) {
   Vector3d g = Vector3d::Zero();
   g.head(w.m.gravity.size()) = w.m.gravity;
   std::vector<FrameMotion> all;
@@ -182,7 +180,7 @@ template <class Space> RowMajor motions_of_states(const RowMajor &q, const RowMa
   return found;
 }
 
-template <class Space> RowMajor without_work(const RowMajor &q, const RowMajor &forces, Workspace<Space, double> &w) {
+template <class Space> RowMajor without_work(const Rows &q, const Rows &forces, Workspace<Space, double> &w) {
   constexpr int d = Space::dim, linear = Space::linear;
   const std::vector<double> still(w.m.n_v);
   RowMajor found(forces.rows(), forces.cols());
@@ -220,9 +218,9 @@ RowMajor totals_of_states(const Mechanism<Space> &m, const Scene &scene, const R
 }
 
 #define FFROBOT_INSTANTIATE(Space)                                                                                     \
-  template std::vector<FrameMotion> frame_motions(const double *, const double *, Workspace<Space, double> &);         \
+  template std::vector<FrameMotion> frame_motions(const Workspace<Space, double> &);                                   \
   template RowMajor motions_of_states(const RowMajor &, const RowMajor &, Workspace<Space, double> &);                 \
-  template RowMajor without_work(const RowMajor &, const RowMajor &, Workspace<Space, double> &);                      \
+  template RowMajor without_work(const Rows &, const Rows &, Workspace<Space, double> &);                              \
   template RowMajor totals_of_states(const Mechanism<Space> &, const Scene &, const RowMajor &, const RowMajor &);
 FFROBOT_INSTANTIATE(Planar)
 FFROBOT_INSTANTIATE(Spatial)

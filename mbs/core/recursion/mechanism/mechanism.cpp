@@ -38,15 +38,12 @@ SpatialData at_marker(const SpatialData &data, const SpatialMarker &m) {
 }
 
 // Of the body's data, where its frame is at a marker: in axes of that
-Vector3d origin_from(const PlanarMarker &m) {
-  const Vector2d x = -(Eigen::Rotation2D<double>(-m.angle) * m.position);
-  return {x[0], x[1], 0};
+Matrix3d axes_from(const PlanarMarker &m) {
+  Matrix3d axes = Matrix3d::Identity();
+  axes.topLeftCorner<2, 2>() = Eigen::Rotation2D<double>(-m.angle).toRotationMatrix();
+  return axes;
 }
-Vector3d origin_from(const SpatialMarker &m) { return -(m.triad.transpose() * m.position); }
-
-// Of its axes in those of the body, in the plane
-double turn_of(const PlanarMarker &m) { return m.angle; }
-double turn_of(const SpatialMarker &) { return 0; }
+Matrix3d axes_from(const SpatialMarker &m) { return m.triad.transpose(); }
 
 // Whether a frame fixed at the inboard marker is where the joint holds the section: modes move the section at most in
 // ways that the joint leaves free, and nothing asks for the joint's coordinate.
@@ -276,9 +273,10 @@ template <class Space> void Mechanism<Space>::place_frame(Node<Space> &node, Pla
                   !is_curved(model.data, inboard, Space::axis);
     tilts = node.is_pin && !sits;
   }
-  if (sits || tilts)
-    model.data = at_marker(model.data, inboard), node.origin = origin_from(inboard), node.turn = turn_of(inboard);
-  else
+  if (sits || tilts) {
+    model.data = at_marker(model.data, inboard), node.axes = axes_from(inboard);
+    node.origin = -(node.axes.leftCols(inboard.position.size()) * inboard.position);
+  } else
     node.inboard = node.outboard, markers.push_back(model.inboard_marker);
   if constexpr (std::is_same_v<Space, Planar>)
     node.body = planar::Body(model.data, markers, tilts ? model.inboard_marker : -1);

@@ -41,8 +41,8 @@ template <class Space> struct Node {
   bool has_constraints = false;    // constraint equations that are coordinates of the joint
   bool is_single_grounded = false; // on the ground, without a child: forces on the ground are kept (Hinge::f)
   bool is_weightless = false;      // a rotor's inertia alone and no child: what carries it feels no inertia
-  Vector3d origin = Vector3d::Zero(); // of the body's data, in axes of the frame
-  double turn = 0;                    // in the plane: of the frame's axes in those of the body's data
+  Vector3d origin = Vector3d::Zero();   // of the body's data, in axes of the frame
+  Matrix3d axes = Matrix3d::Identity(); // of the same
 
   // Evaluations do not read these
   std::string name;
