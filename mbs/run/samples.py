@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Array, Indices
+from ...common.arrays import Array, Indices, in_parts
 from .. import _core
 from ..scene.analysis import IntegratedAnalysis
 
@@ -31,6 +31,7 @@ class _Looks(NamedTuple):
 
 
 LOOKS = _Looks()
+AT_ONCE = 256  # states that are compared together: more leave the cache
 SAME = 1e-13  # of the latest time, by which equal ones differ at most: round-off of k h and of sums of h
 
 
@@ -78,8 +79,11 @@ def telling(times: Array, values: Array, sizes: Array) -> Indices:
         middle = np.arange(1, len(chain) - 1, 2)
         before, at, after = (chain[middle + shift] for shift in (-1, 0, 1))
         share = ((times[at] - times[before]) / (times[after] - times[before]))[:, None]
-        off = np.abs(values[at] - (1.0 - share) * values[before] - share * values[after])
-        left = np.delete(chain, middle[(off <= misses).all(axis=1)])
+        linear = np.zeros(len(middle), dtype=bool)
+        for k in in_parts(len(middle), AT_ONCE):
+            off = values[at[k]] - (1.0 - share[k]) * values[before[k]] - share[k] * values[after[k]]
+            linear[k] = (np.abs(off) <= misses).all(axis=1)
+        left = np.delete(chain, middle[linear])
         if len(left) > LOOKS.thinned * len(chain):
             break
         chain = left
