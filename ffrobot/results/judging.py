@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
-from ..common.arrays import Array
+from ..common.arrays import Array, in_parts
 from ..common.peaks import largest, root_mean_square
-from ..mbs.quantities.motion import section_motion
+from ..mbs.quantities.motion import AT_ONCE, section_motion
+from ..mbs.run.record import Run
+from ..mbs.scene.trajectories import Trajectory
 from ..run.result import AnalysisResult, Solution
 from .joints import Coordinates, Scene, labelled_coordinates
 from .kinds import at_rest_in_words, own_results, read_motors, read_unsupplied
@@ -33,17 +35,21 @@ def write_off_path(group: h5py.Group, solution: Solution, result: AnalysisResult
     if source not in solution.analyses or _is_controlled(group) or not len(run.time):
         return
     of, last = group.parent[source], solution.analyses[source].analysis.last_time
-    both = (run.time >= of["time"][0]) & (run.time <= of["time"][-1] * (1.0 + SAME))
-    time = run.time[both]
-    inside = np.clip(time, 0.0, last)
+    both = np.flatnonzero((run.time >= of["time"][0]) & (run.time <= of["time"][-1] * (1.0 + SAME)))
+    time, parts = run.time[both], in_parts(len(both) or 1, AT_ONCE)
     for trajectory in run.model.scene.trajectory:
         if f"trajectories/{trajectory.name}/target" in of and trajectory.point is not None and trajectory.components:
-            position = section_motion(run, trajectory.point).r[both]
-            off = [position[:, "xyz".index(axis)] - f.sample(inside)[0] for axis, f in trajectory.components.items()]
-            distance = np.linalg.norm(off, axis=0)
+            distance = np.concatenate([_distance(run.at(both[some]), trajectory, last) for some in parts])
             entry = group.create_group(f"off_path/{trajectory.name}")
             entry.attrs.update(point=trajectory.point, distance=largest(time, distance)[0])
             entry.attrs["distance_rms"] = root_mean_square(time, distance)
+
+
+def _distance(run: Run, trajectory: Trajectory, last: float) -> Array:
+    """(T,), m, of its point from where the path has it, which rests before 0 and after `last`, s."""
+    position, inside = section_motion(run, str(trajectory.point)).r, np.clip(run.time, 0.0, last)
+    off = [position[:, "xyz".index(axis)] - f.sample(inside)[0] for axis, f in trajectory.components.items()]
+    return np.linalg.norm(off, axis=0)
 
 
 def tool_error(group: h5py.Group, scene: Scene, *, feasible: bool | None) -> ToolError:
