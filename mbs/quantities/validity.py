@@ -133,9 +133,9 @@ def missing_to_first_order(link: ModalBody, T: Array, p: Array, loads: ModalLoad
         return Missing(0.0, 0.0)
     stations, places, length = link.stations.translation @ T, link.stations.position, link.length
     # Outputs whose Δp, or whose −½ pᵀK p, may be the largest
-    energy = np.sqrt((p**2 * loads.stiffness).sum(axis=1))
-    sizes = np.sqrt(loads.squares) * energy, energy
-    at = np.unique(np.concatenate([np.argsort(-of)[:OUTPUTS] for of in sizes]))
+    energy = np.sqrt(p**2 @ loads.stiffness)
+    sizes, count = (np.sqrt(loads.squares) * energy, energy), min(OUTPUTS, len(p))
+    at = np.unique(np.concatenate([np.argpartition(-of, count - 1)[:count] for of in sizes]))
     S = np.tensordot(loads.f[at], loads.K, axes=1)
     stiffness = np.diag(loads.stiffness) + S
     if loads.support is not None:
