@@ -19,7 +19,7 @@ def largest(time: Array, values: Array) -> tuple[float, float]:
 
 
 def largest_below(bounds: Array, largest_of: Callable[[Indices], float]) -> float:
-    """Return the largest of values below `bounds` (T,), any unit, by `largest_of` those that may be it; 0 of none."""
+    """The largest of values below `bounds` (T,), any unit, by `largest_of` those that may be it; 0 of none."""
     if not len(bounds):
         return 0.0
     known = largest_of(bounds.argmax(keepdims=True))

@@ -76,13 +76,6 @@ class MotionForces:
     system: MultibodySystem
     found: _core.MotionForces
 
-    def of_joint(self, number: int) -> Wrench:
-        """The wrench of the joint of body no. `number` on its outer side, including a rotor there."""
-        node, on_section = self.system.model.tree.nodes[number], _wrench(self.found.joints, number)
-        if not node.backwards:
-            return on_section
-        return Wrench(on_section.force, on_section.moment + self.of_rotor(number))
-
     def of_rotor(self, number: int) -> Array:
         """The rate (T, 3), N·m, of the angular momentum of the rotor in the joint that carries body `number`."""
         return self.found.rotors[:, 3 * number : 3 * number + 3]
@@ -92,17 +85,19 @@ class MotionForces:
 
         Forces that do work are left out: of motors, loads and friction along joint coordinates.
         """
-        numbers = range(len(self.system.model.tree.nodes))
-        of_joints = np.hstack([part for number in numbers for part in self.of_joint(number)])
+        nodes, of_joints = self.system.model.tree.nodes, self.found.joints.copy()
+        for number, node in enumerate(nodes):
+            if node.backwards:  # a rotor sits on the outer side
+                of_joints[:, 6 * number + 3 : 6 * number + 6] += self.of_rotor(number)
         table = self.system.core.without_work(q, of_joints)
-        return [_wrench(table, number) for number in numbers]
+        return [_wrench(table, number) for number in range(len(nodes))]
 
     def of_row(self, number: int) -> Wrench:
         """The wrench of constraint equation `number` on its section b; 0 for joint coordinates."""
-        return _wrench(self.found.constraints, 2 * number + 1)
+        return _wrench(self.found.constraints, number)
 
     def on_sections(self, body: int) -> tuple[list[Section], Array]:
-        """Return the sections of body no. `body`, and (T, 2 sections, 3) force and moment on each, with its joints'."""
+        """The sections of body no. `body`, and (T, 2 sections, 3) force and moment on each, with its joints'."""
         sections = self.system.sections
         numbers = [number for number, section in enumerate(sections) if section.body == body]
         first, end = numbers[0], numbers[-1] + 1
@@ -113,7 +108,7 @@ class MotionForces:
         return _motion(self.found.bodies, number)
 
     def axes(self, number: int) -> Array:
-        """Return the axes (T, 3, 3) of the frame of body no. `number`."""
+        """The axes (T, 3, 3) of the frame of body no. `number`."""
         return self.found.axes[:, 9 * number : 9 * number + 9].reshape(-1, 3, 3)
 
     def of_point(self, point: str) -> SectionMotion:

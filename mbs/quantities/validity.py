@@ -189,7 +189,7 @@ def largest_displacement(link: ModalBody, p: Array) -> float:
 
 
 def _largest(p: Array, shapes: Array) -> float:
-    """Return the largest |shape · p|, m or rad, of k `shapes` (k, axes, n) over p (T, n), √kg·m."""
+    """The largest |shape · p|, m or rad, of k `shapes` (k, axes, n) over p (T, n), √kg·m."""
 
     def largest_of(rows: Indices) -> float:  # one shape after the other: all at once may not fit into memory
         at = p[rows].T
@@ -348,7 +348,7 @@ def _on_modes(link: ModalBody, run: Run, node: Node, sizes: Mapping[str, Array])
 
 
 def shape_from_chord(link: ModalBody, p: Array) -> tuple[float, float, Array]:
-    """Return the largest deflection (m) and section rotation (rad) from the chord, and foreshortening (T,), m.
+    """The largest deflection (m) and section rotation (rad) from the chord, and foreshortening (T,), m.
 
     At p (T, n), √kg·m, of the file. Slopes along y and z: v' = φ_z, w' = −φ_y.
     """

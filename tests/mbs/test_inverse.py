@@ -18,7 +18,6 @@ from random_mechanisms import TYPES, random_tree
 
 from ffrobot.mbs import _core
 from ffrobot.mbs.model.gears import with_compliance
-from ffrobot.mbs.model.known_motion import Wrench
 from ffrobot.mbs.quantities.motion import acting_forces, system_of
 from ffrobot.mbs.quantities.supply import totals
 
@@ -89,17 +88,16 @@ def check_points(motion):
     for number, (node, expected) in enumerate(zip(tree.nodes, of_bodies, strict=True)):
         force, moment, frame = 0.0, 0.0, state.frames[number]
         sections, wrenches = acting_forces(motion).on_sections(number)
-        for k, section in enumerate(sections):
-            place = tree_oracle.motion(tree, section, motion.q, state.frames)
-            at_frame = Wrench(*wrenches[:, 2 * k : 2 * k + 2].swapaxes(0, 1)).seen_from(place.r - frame.r)
-            force, moment = force + at_frame.force, moment + at_frame.moment
+        by_section = wrenches.reshape(len(wrenches), -1, 2, 3).transpose(1, 2, 0, 3)
+        for section, (acting, turning) in zip(sections, by_section, strict=True):
+            arm = tree_oracle.motion(tree, section, motion.q, state.frames).r - frame.r
+            force, moment = force + acting, moment + turning + np.cross(arm, acting)
         wrench, modal = expected[:, :6], expected[:, 6:]
         size = np.abs(wrench[:, :3]).max() + np.abs(wrench[:, 3:]).max()
         np.testing.assert_allclose(np.hstack([force, moment]), wrench, rtol=0, atol=1e-11 * size)
         found = acting_forces(motion).found.modal[:, node.p_v]
         np.testing.assert_allclose(found, modal, rtol=0, atol=1e-12 * np.abs(modal).max(initial=1.0))
-        of_body = acting_forces(motion).of_body(number)
         a, alpha, _ = np.split(of_all[number], [3, 6], axis=1)
         alpha = np.einsum("tij,tj->ti", frame.F, alpha)
-        for found, wanted in ((of_body.a, a), (of_body.alpha, alpha)):
+        for found, wanted in zip(acting_forces(motion).of_body(number), (a, alpha), strict=False):
             np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-11 * np.abs(wanted).max(initial=1.0))

@@ -21,24 +21,10 @@ void bind_constraints(nb::module_ &m) {
 }
 
 void bind_motions_and_forces(nb::module_ &m) {
-  nb::class_<FrameMotion>(m, "FrameMotion", "Motion of a body's frame, global axes.")
-      .def_ro("r", &FrameMotion::r)
-      .def_ro("a", &FrameMotion::a)
-      .def_ro("alpha", &FrameMotion::alpha)
-      .def_ro("R", &FrameMotion::R);
-  nb::class_<MotionForces>(
+  bind_fields(nb::class_<FrameMotion>(m, "FrameMotion", "Motion of a body's frame, global axes."));
+  bind_fields(nb::class_<MotionForces>(
       m, "MotionForces",
-      "Forces between bodies and in joints over states (T, …), N, with moments about the sections on which they act, "
-      "N m, global axes; mbs/core/recursion/inverse/motion_forces.h.")
-      .def_ro("bodies", &MotionForces::bodies, "(T, 9 bodies) acceleration, angular acceleration, angular velocity.")
-      .def_ro("axes", &MotionForces::axes, "(T, 9 bodies) of the frames of bodies, row by row.")
-      .def_ro("points", &MotionForces::points, "(T, 9 wrenches) the same of sections on which wrenches may act.")
-      .def_ro("sections", &MotionForces::sections, "(T, dim sections) sum on each of the model's sections.")
-      .def_ro("joints", &MotionForces::joints, "(T, dim bodies) of the joint of each body on its outer section.")
-      .def_ro("constraints", &MotionForces::constraints, "(T, 2 dim rows) on section a, then on section b of each.")
-      .def_ro("wrenches", &MotionForces::wrenches, "(T, dim wrenches) given forces, and those along cut joints.")
-      .def_ro("modal", &MotionForces::modal, "(T, n_v) modal forces that sections and actuators have to supply.")
-      .def_ro("rotors", &MotionForces::rotors, "(T, 3 bodies) rate of angular momentum of the rotor in each joint.");
+      "Forces between bodies and in joints over states: mbs/core/recursion/inverse/motion_forces.h."));
 }
 
 } // namespace

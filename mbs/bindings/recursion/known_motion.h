@@ -82,7 +82,7 @@ MotionForces motion_forces(Model<Space> &model, const Scene &scene, const std::v
   at_known_states(model, scene, {times, q, v, a}, [&](Index i, const auto &acting, auto &forces, auto &w) {
     const double *lambda = multipliers.row(i).data();
     forces.load(lambda, acting.wrench, w);
-    found.write(i, q.row(i).data(), a.row(i).data(), lambda, acting.wrench, forces, w);
+    found.write(i, q.row(i).data(), a.row(i).data(), lambda, forces, w);
   });
   return found.found();
 }

@@ -45,11 +45,10 @@ ForcesOfStates<Space>::ForcesOfStates(const Mechanism<Space> &mechanism, Index s
   const auto resize = [states](RowMajor &table, std::size_t size, std::size_t count) {
     table.setZero(states, size * count);
   };
-  const std::size_t bodies = mechanism.nodes.size(), wrenches = mechanism.wrenches.size();
-  resize(found_.bodies, 9, bodies), resize(found_.axes, 9, bodies), resize(found_.points, 9, wrenches);
+  const std::size_t bodies = mechanism.nodes.size();
+  resize(found_.bodies, 9, bodies), resize(found_.axes, 9, bodies), resize(found_.points, 9, mechanism.wrenches.size());
   resize(found_.sections, Space::dim, sections(mechanism).size()), resize(found_.joints, Space::dim, bodies);
-  resize(found_.constraints, 2 * Space::dim, mechanism.constraints.size()),
-      resize(found_.wrenches, Space::dim, wrenches);
+  resize(found_.constraints, Space::dim, mechanism.constraints.size());
   resize(found_.modal, 1, mechanism.n_v), resize(found_.rotors, 3, bodies);
 }
 
@@ -66,14 +65,12 @@ void ForcesOfStates<Space>::write_constraints(Index i, const double *lambda, con
   ConstraintMotion<double> motion;
   for (std::size_t r = 0; r < mechanism_.constraints.size(); ++r) {
     constraint_motion(mechanism_.constraints[r], w, mechanism_.constraints[r].moves, motion);
-    double *to = block(found_.constraints, i, 2 * Space::dim, r);
-    write_wrench<Space>(motion.force, motion.moment_a, lambda[r], to);
-    write_wrench<Space>(motion.force, motion.moment_b, -lambda[r], to + Space::dim);
+    write_wrench<Space>(motion.force, motion.moment_b, -lambda[r], block(found_.constraints, i, Space::dim, r));
   }
 }
 
 template <class Space>
-void ForcesOfStates<Space>::write(Index i, const double *q, const double *a, const double *lambda, const double *wrench,
+void ForcesOfStates<Space>::write(Index i, const double *q, const double *a, const double *lambda,
                                   NewtonEuler<Space> &forces, Workspace<Space, double> &w) {
   write_constraints(i, lambda, w);
   forces.transmit(w);
@@ -81,8 +78,6 @@ void ForcesOfStates<Space>::write(Index i, const double *q, const double *a, con
   write_sections(i, forces, w);
   for (std::size_t k = 0; k < mechanism_.wrenches.size(); ++k)
     write_point(mechanism_.wrenches[k], forces, w, block(found_.points, i, 9, k));
-  if (wrench)
-    std::copy_n(wrench, found_.wrenches.cols(), found_.wrenches.row(i).data());
   forces.require_of_modes(q, a, w, found_.modal.row(i).data());
   forces.leave_frames(w);
   const std::vector<FrameMotion> frames = frame_motions(w);

@@ -13,20 +13,20 @@ struct MotionForces {
   RowMajor points;      // 9 of each section on which a wrench may act: the same
   RowMajor sections;    // of each section of bodies where joints, constraints or wrenches are: all that acts there
   RowMajor joints;      // of each body: what its joint does to its outer section
-  RowMajor constraints; // of each: on its section a, then on its section b
-  RowMajor wrenches;    // of each section on which a wrench may act: given forces, and those along cut joints
+  RowMajor constraints; // of each: on its section b
   RowMajor modal;       // (n_v) see NewtonEuler::require_of_modes
   RowMajor rotors;      // 3 of each body: rate of angular momentum of the rotor in its joint
+
+  FFROBOT_FIELDS(bodies, axes, points, sections, joints, constraints, modal, rotors);
 };
 
 template <class Space> class ForcesOfStates {
 public:
   ForcesOfStates(const Mechanism<Space> &mechanism, Index states); // the mechanism must outlive this
 
-  // Row i, after prepare() without generalized forces, accelerate() and load() of lambda (constraints) and of `wrench`
-  // (wrenches, dim; may be null)
-  void write(Index i, const double *q, const double *a, const double *lambda, const double *wrench,
-             NewtonEuler<Space> &forces, Workspace<Space, double> &w);
+  // Row i, after prepare() without generalized forces, accelerate() and load() of lambda (constraints) and wrenches
+  void write(Index i, const double *q, const double *a, const double *lambda, NewtonEuler<Space> &forces,
+             Workspace<Space, double> &w);
 
   // Joints and constraints of row i: what lambda does by itself, after load() of it
   void write_loads(Index i, const double *lambda, NewtonEuler<Space> &forces, const Workspace<Space, double> &w);

@@ -13,6 +13,8 @@ struct FrameMotion {
   Vector3d r, a, omega, alpha;
   Matrix3d R;
   Vector3d a_origin;
+
+  FFROBOT_FIELDS(r, a, omega, alpha, R, a_origin);
 };
 
 template <class Space> std::vector<FrameMotion> frame_motions(const Workspace<Space, double> &w);
