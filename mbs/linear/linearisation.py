@@ -154,7 +154,7 @@ class LinearEquations:
         inputs = {}
         for joint, columns in self.model.motors.items():
             beside = shares[joint].direction @ H if joint in shares else 0.0
-            for name, k in _labelled(joint, columns):
+            for name, k in zip(_names(joint, len(columns)), columns, strict=True):
                 inputs[name] = self.model.sign(joint) * (H[k] + beside)
         return inputs | self._along_axes("force", points)
 
@@ -192,10 +192,7 @@ class LinearEquations:
 
 def labelled(model: Model, joint: str) -> Iterator[tuple[str, int]]:
     """Yield the name of each coordinate of a joint, "joint/NAME" or "joint/NAME 1", …, and its number in v."""
-    return _labelled(joint, model.columns(joint))
-
-
-def _labelled(joint: str, columns: Array) -> Iterator[tuple[str, int]]:
+    columns = model.columns(joint)
     yield from zip(_names(joint, len(columns)), map(int, columns), strict=True)
 
 

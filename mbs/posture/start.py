@@ -141,9 +141,9 @@ def displaced_joints(model: Model, start: State, joints: Container[str] | None =
     places = model.tree.places(start.q[None], start.v[None])
     for joint in (joint for joint in model.scene.joint if not joint.locates):
         a, b = (places.at(side) for side in model.tree.sides(joint))
-        left = logarithm(exponential(-vectors.get(joint.name, np.zeros(3))) @ a.F[0].T @ b.F[0])
-        rate = b.F[0].T @ (b.omega - a.omega)[0] - given.get(joint.name, np.zeros(3))
-        off.append((joint.name, left, rate, np.ones(3)))
+        value, rate = (of.get(joint.name, np.zeros(3)) for of in (vectors, given))
+        left = logarithm(exponential(-value) @ a.F[0].T @ b.F[0])
+        off.append((joint.name, left, b.F[0].T @ (b.omega - a.omega)[0] - rate, np.ones(3)))
     values, rates = initial.named("joints"), initial.named("joint_rates")
     moved = dict.fromkeys(
         name
