@@ -275,7 +275,8 @@ def evolve(evaluations: Evaluations, seed: int, start: Place | None, tell: Calla
         """Return scaled responses (1 + m, S) of S places (n, S), or of one (n); infinite where designs fail."""
         designs = evaluations.at([tuple(map(float, place)) for place in places.reshape(count, -1).T])
         failed = np.full(len(problem.responses), np.inf)
-        return np.column_stack([problem.scaled(one.values) if one.completed else failed for one in designs])
+        rows = [problem.scaled(one.values) if one.completed else failed for one in designs]
+        return np.reshape(rows, (-1, len(failed))).T
 
     limits = (NonlinearConstraint(lambda places: values(places)[1:], -np.inf, 0.0),) if problem.limits else ()
     try:

@@ -274,6 +274,8 @@ def test_evolution_keeps_limits_and_tells_the_best_of_all_designs_when_runs_end(
     kept = [one for one in found.tried if one.completed and found.problem.violation(one.readings) <= 1e-6]
     assert 0 < len(kept) < len(found.tried)
     assert found.value == min(one.values[0] for one in kept)
+    none = optimise(write(ARM), vary, minimise="mass", subject_to=[f"{MOTOR} <= 1e-9"], runs=17)
+    assert (none.method, none.feasible) == ("differential-evolution", False)  # in no generation
 
 
 OMEGA = np.pi / 6e-4  # rad/s
