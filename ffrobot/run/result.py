@@ -256,7 +256,7 @@ class AnalysisResult:
         for gauge in filter(None, (sensor.strain for sensor in getattr(self.analysis, "sensor", ()))):
             link, _, point = gauge.partition(".")
             patched, place = self.prepared.patches.get(link), self.prepared.links[link].stress[point].position
-            if patched is not None and (link in self.prepared.divided or not patched.is_beside(place)):
+            if patched and (link in self.prepared.divided or not patched.is_beside(place)):
                 where = "below a patch or on a subdivided link with patches a gauge"
                 texts.append(f'strain "{gauge}": {where} reads the strain of modes alone, tens of percent off')
         return tuple(texts)
