@@ -90,6 +90,13 @@ def numbers(item: object, name: str) -> NDArray[np.float64]:
     return np.asarray(read(item), dtype=np.float64)
 
 
+def datasets_in(group: h5py.Group) -> dict[str, h5py.Dataset]:
+    """Return all datasets below `group` by their names in it."""
+    items: dict[str, h5py.Dataset | h5py.Group] = {}
+    group.visititems(items.__setitem__)
+    return {name: item for name, item in items.items() if isinstance(item, h5py.Dataset)}
+
+
 def fields_in(values: Mapping[str, Any], record: "type[DataclassInstance]") -> dict[str, Any]:
     """Return the fields of `record`, by name, from a group or attributes. Raises `KeyError` for missing ones.
 

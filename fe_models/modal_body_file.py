@@ -12,7 +12,7 @@ from ..common.arrays import Array, NDArray
 from ..common.checksum import MARK, METHOD, sealed
 from ..common.errors import InputError, naming
 from ..common.files import AnyPath, write_atomically
-from ..common.hdf5 import fields_in, image_of, in_memory, numbers, open_checked, read
+from ..common.hdf5 import datasets_in, fields_in, image_of, in_memory, numbers, open_checked, read
 from ..common.meanings import write_record
 from .modal_body import Interface, MeasuredValues, ModalBody, OutlinedPatches, PictureMesh, Stations, StressPoint
 
@@ -167,18 +167,11 @@ def _body(file: h5py.File) -> ModalBody:
     if "damping_of" in file["modes"].attrs:
         values["damping_of"] = _text(file["modes"].attrs["damping_of"])
     values |= {name: _text(file.attrs.get(name, "")) for name in _OPTIONAL}
-    points, matrices = file.get("stress/points", {}), dict[str, Array]()
-
-    def collect(name: str, item: h5py.Dataset | h5py.Group) -> None:
-        if isinstance(item, h5py.Dataset):
-            matrices[name] = _array(file["geometric_stiffness"], name)
-
-    if "geometric_stiffness" in file:
-        file["geometric_stiffness"].visititems(collect)
+    points, K = file.get("stress/points", {}), file.get("geometric_stiffness")
     return ModalBody(
         **values,
         family=_texts(file, "modes/family"),
-        geometric_stiffness=matrices,
+        geometric_stiffness={} if K is None else {name: _array(K, name) for name in datasets_in(K)},
         interfaces={
             name: Interface(**_arrays(group, Interface) | {"coupling": _text(group.attrs.get("coupling", ""))})
             for name, group in file["interfaces"].items()

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from ..common.arrays import Array
 from ..common.errors import InputError
-from ..common.hdf5 import open_checked
+from ..common.hdf5 import datasets_in, open_checked
 from ..common.meanings import MODAL_BODY, RESULTS, Meaning, meaning
 from ..fe_models.modal_body import Interface, ModalBody
 from ..fe_models.modal_body_file import FORMAT as MODAL_FORMAT
@@ -117,14 +117,10 @@ def _results(results: Results) -> str:
 
 def _datasets(groups: Iterable[h5py.Group], meanings: Mapping[str, Meaning]) -> str:
     table = Table("dataset", "shape", "unit", "what")
-
-    def add(name: str, item: h5py.Dataset | h5py.Group) -> None:
-        if isinstance(item, h5py.Dataset):
+    for group in groups:
+        for name, item in datasets_in(group).items():
             known = meaning(name, meanings) or Meaning("", "")
             table.add_row(item.name, str(item.shape), known.unit, known.what)
-
-    for group in groups:
-        group.visititems(add)
     return _rendered(table)
 
 

@@ -18,7 +18,7 @@ from ..common.arrays import Array
 from ..common.checksum import sealed
 from ..common.errors import InputError, check_known, did_you_mean, quoted
 from ..common.files import write_atomically
-from ..common.hdf5 import blaming, fields_in, numbers, open_checked
+from ..common.hdf5 import blaming, datasets_in, fields_in, numbers, open_checked
 from ..common.libraries import extras
 from ..common.structs import struct
 from ..fe_models.modal_body import ModalBody
@@ -176,13 +176,10 @@ class Results:
     def histories(self, analysis: str) -> list[str]:
         """Names of the histories of an analysis: datasets over its outputs."""
         if analysis not in self._histories:  # a walk through a file takes ms
-            names, outputs = self._histories.setdefault(analysis, []), len(self.time(analysis))
-
-            def collect(name: str, item: h5py.Dataset | h5py.Group) -> None:
-                if isinstance(item, h5py.Dataset) and item.shape[:1] == (outputs,) and not name.startswith("resume/"):
-                    names.append(name)
-
-            self._file[analysis].visititems(collect)
+            outputs, found = (len(self.time(analysis)),), datasets_in(self._file[analysis])
+            self._histories[analysis] = [
+                name for name, item in found.items() if item.shape[:1] == outputs and not name.startswith("resume/")
+            ]
         return list(self._histories[analysis])
 
     def columns(self, analysis: str) -> dict[str, Array]:
@@ -331,9 +328,7 @@ class Results:
 
     def keys(self) -> list[str]:
         """Names of all datasets, for `results[NAME]`."""
-        names: list[str] = []
-        self._file.visititems(lambda name, item: names.append(name) if isinstance(item, h5py.Dataset) else None)
-        return [name for name in names if "/resume/" not in name]
+        return [name for name in datasets_in(self._file) if "/resume/" not in name]
 
     def _ipython_key_completions_(self) -> list[str]:
         return self.keys()
