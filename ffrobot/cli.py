@@ -32,7 +32,7 @@ def cli() -> None:
     Stage 1:  ffrobot link  LINK.toml   finite elements → modal body file
     Stage 2:  ffrobot solve SCENE.toml  modal bodies → torques and voltages
     Then:     ffrobot info, ffrobot plot, ffrobot view, ffrobot report
-    """  # noqa: D301 (click wants the backspace itself)
+    """
 
 
 @cli.command()
@@ -43,7 +43,7 @@ def schema(kind: str) -> None:
     \b
     ffrobot schema scene > scene.schema.json
     and, as the first line of a scene file:  #:schema ./scene.schema.json
-    """  # noqa: D301 (click wants the backspace itself)
+    """
     import json
 
     from .schema import schema as schema_of

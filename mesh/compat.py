@@ -35,13 +35,13 @@ if _NEEDS_SETUPTOOLS:
 
 _SHOWN = warnings.showwarning
 
-import basix  # noqa: E402
-import dolfinx  # noqa: E402
-import ufl  # noqa: E402
-from dolfinx import fem  # noqa: E402
-from dolfinx.fem import FunctionSpace  # noqa: E402
-from dolfinx.mesh import CellType, GhostMode, Mesh, create_cell_partitioner, create_mesh  # noqa: E402
-from mpi4py import MPI  # noqa: E402
+import basix
+import dolfinx
+import ufl
+from dolfinx import fem
+from dolfinx.fem import FunctionSpace
+from dolfinx.mesh import CellType, GhostMode, Mesh, create_cell_partitioner, create_mesh
+from mpi4py import MPI
 
 if warnings.showwarning is not _SHOWN:  # FFCx has the log take all warnings, also those of others
     logging.captureWarnings(False)

@@ -148,7 +148,7 @@ def stiffness_ratios(placed: PlacedLayout, body: ModalBody) -> tuple[Array, Arra
 
 def gauss_points(body: ModalBody, intervals: Array) -> Iterator[GaussPoint]:
     """Yield Gauss points along `intervals` (m, 2), m, split at stations, where shapes have kinks and sections steps."""
-    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)  # type: ignore[no-untyped-call, unused-ignore]
+    nodes, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     stations = body.stations.position[:, 0]
     for number, (start, end) in enumerate(intervals):
         slack = SLIVER * (end - start)

@@ -105,7 +105,7 @@ def geometric_stiffness(link: BeamLink, stations: Functions, fields: Array, inte
 
 def _at_gauss_points(stations: Functions, fields: Array) -> tuple[Array, Array, Array, Array]:
     """Points x (g,) m with their weights (g,) m, and fields (6, g, n) there with their derivatives by x."""
-    nodes, weights = leggauss(POINTS)  # type: ignore[no-untyped-call, unused-ignore]
+    nodes, weights = leggauss(POINTS)
     lengths = stations.lengths[:, None]
     at = (stations.nodes[:-1, None] + lengths * 0.5 * (nodes + 1)).ravel()
     values, slopes = (np.array([stations.at(at, order) @ field for field in fields]) for order in (0, 1))

@@ -55,7 +55,7 @@ class Functions:
 
         x is in m, weight (e,) in any unit.
         """
-        points, weights = leggauss(GAUSS)  # type: ignore[no-untyped-call, unused-ignore]
+        points, weights = leggauss(GAUSS)
         elements = len(self.element)
         values = self._within(np.repeat(np.arange(elements), GAUSS), np.tile(0.5 * (points + 1), elements), derivative)
         scale = np.sqrt((weight * self.lengths)[:, None] * (0.5 * weights))

@@ -42,7 +42,7 @@ def surface_shear(extent: float, across: float, width: float) -> float:
 
     The face is `across` (m) wide, the opposite one `extent` (m) away.
     """
-    nodes, weights = np.polynomial.legendre.leggauss(MEAN_POINTS)  # type: ignore[no-untyped-call, unused-ignore]
+    nodes, weights = np.polynomial.legendre.leggauss(MEAN_POINTS)
     record = RectangleSection(shape="rectangle", height=extent, width=across)
     values = [_torsion(record, extent / 2, node * width / 2)[1] for node in nodes]
     return float(np.dot(weights, values)) / 2

@@ -82,7 +82,7 @@ def _of_inertia(link: BeamLink, stations: Stations, W: Array, x: float) -> Array
     start, end = np.append(starts, np.full(len(cut), x)), np.append(ends, ends[cut])
     end[cut] = x
     # Exact: arm × cubic.
-    gauss, weights = leggauss(3)  # type: ignore[no-untyped-call, unused-ignore]
+    gauss, weights = leggauss(3)
     half = 0.5 * (end - start)[:, None]
     s = (0.5 * (start + end)[:, None] + half * gauss).ravel()
     moved = through(stations, np.repeat(stations.element[element], gauss.size, axis=0), s)

@@ -70,7 +70,7 @@ def sensitivity(scene_file: Path, of: tuple[str, ...], to: tuple[str, ...], outp
     central differences otherwise, with error estimates and in percent per percent. Derivatives of a peak are those at
     its own time; a note appears if another peak becomes the largest. The same command resumes a stopped study and
     recomputes changed runs.
-    """  # noqa: D301 (click wants the backspace itself)
+    """
     keys = [key for text in to for key in text.split(",")]
     _study(studies.sensitivity, scene_file, of, keys, folder=output or scene_file.with_suffix(".sensitivity"), **how)
 
@@ -99,7 +99,7 @@ def optimise(scene_file: Path, vary: tuple[str, ...], output: Path | None, **how
     searched by differential evolution. The same command resumes a stopped study. DIR/best has the optimal scene,
     DIR/designs.csv all designs with their responses, DIR/designs.png their parallel coordinates. The exit code is 1
     if no design satisfies the limits.
-    """  # noqa: D301 (click wants the backspace itself)
+    """
     folder, points = output or scene_file.with_suffix(".optimum"), how.pop("points")
     if how["against"] is None:
         del how["against"]
@@ -134,7 +134,7 @@ def uncertainty(
 
     --by gradients ranks many parameters with two runs for each. Every number has an error estimate. The same command
     resumes a stopped study; failed runs are listed and omitted.
-    """  # noqa: D301 (click wants the backspace itself)
+    """
     _study(studies.uncertainty, scene_file, of, spread, folder=output or scene_file.with_suffix(".uncertainty"), **how)
 
 
@@ -168,7 +168,7 @@ def sweep(
 
     Entries of lists of tables are selected by name or body. The same command resumes a stopped sweep. -j runs in
     parallel on one machine, mpirun and --scheduler on several. The exit code is 1 if no run completes.
-    """  # noqa: D301 (click wants the backspace itself)
+    """
     from ..present.console import Display, summary_console
     from ..sweep.sweep import drop_results, forget_failures, plan_sweep, print_table, run_sweep, stale_rows
 

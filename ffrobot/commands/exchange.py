@@ -154,7 +154,7 @@ def export(
     exudyn            .npz of EXUDYN's ObjectFFRFreducedOrderInterface
     urdf              of a 3D scene, for viewers: links rigid, shapes simple
     fmu               of a scene: FMI 2.0, co-simulation, of a forward motion under torques and voltages
-    """  # noqa: D301 (click wants the backspace itself)
+    """
     from ..exchange.export import export_file, print_export
     from ..present.console import summary_console
 

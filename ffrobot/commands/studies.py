@@ -92,7 +92,7 @@ def fit(file: Path, measured: Path | None, frf: Path | None, vary: tuple[str, ..
     A link vibrates under its reference condition, a robot at the start of its scene. KEY=KEY: common factor.
     Prints uncertainties of the values, and rejects keys that the measurement cannot distinguish. FRFs of a robot are
     compared in the poses of their tests; a picture shows measured and fitted curves.
-    """  # noqa: D301 (click wants the backspace itself)
+    """
     from ..fit.fitting import fit_measured, print_fit
     from ..present.console import summary_console
 
@@ -159,7 +159,7 @@ def map_(
 
     Motors keep the pose; links and compliant gears deflect under weight and loads. Joints that the grid leaves open
     stay as near to the start of the scene as they can. The same command resumes a stopped map.
-    """  # noqa: D301 (click wants the backspace itself)
+    """
     from ..map.map_file import TABLE, print_map, write_map
     from ..map.pose_map import make_map, plan_map
     from ..milling.process import read_milling

@@ -46,7 +46,7 @@ def gauss(stages: int = STAGES, *, of_second_order: bool = False) -> Scheme:
 
     `of_second_order`: p at the points is the second integral of the polynomial for p̈; else Gauss's method for (p, ṗ).
     """
-    c = (np.polynomial.legendre.leggauss(stages)[0] + 1) / 2  # type: ignore[no-untyped-call, unused-ignore]
+    c = (np.polynomial.legendre.leggauss(stages)[0] + 1) / 2
     m = np.arange(stages)
     to_powers = np.linalg.inv(c[:, None] ** m)
     once, twice = 1 / (m + 1), 1 / ((m + 1) * (m + 2))

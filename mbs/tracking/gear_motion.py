@@ -31,12 +31,10 @@ LASTS = 20.0  # D/K after which a gear has come to rest
 GONE = 1e-12  # of the largest twist: decaying parts below it are none
 MANY = np.arange(40) / 40  # of an interval, where a polynomial is looked at for its largest value
 # Coefficients of Legendre's polynomials of 2ξ − 1 by values at the points, and powers of ξ, lowest first, by these
-TO_SERIES = np.linalg.inv(
-    np.polynomial.legendre.legvander(2 * TEN.c - 1, 9)  # type: ignore[no-untyped-call, unused-ignore]
-)
+TO_SERIES = np.linalg.inv(np.polynomial.legendre.legvander(2 * TEN.c - 1, 9))
 POWERS = np.array([[(-1.0) ** (k + i) * comb(k, i) * comb(k + i, i) for k in range(10)] for i in range(10)])
 # of e^{−x} on [0, 1], lowest power first
-EXPONENTIAL: Array = np.polynomial.Polynomial.fit(  # type: ignore[no-untyped-call, unused-ignore]
+EXPONENTIAL: Array = np.polynomial.Polynomial.fit(
     np.linspace(0, 1, 101), np.exp(-np.linspace(0, 1, 101)), 10, domain=[0, 1], window=[0, 1]
 ).coef
 
