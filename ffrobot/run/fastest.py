@@ -73,8 +73,8 @@ def fastest(scene: Scene, judge: "Judge") -> tuple[Scene, str]:
             else "A later end helps"
         )
         raise InputError(
-            f"{scene.path}: trajectory {_names(scene)}: fastest: expected actuators that can follow within end ="
-            f' {search.analysis.end:g} s of "{search.analysis.name}"',
+            f"{_where(scene)}: expected actuators that can follow within end = {search.analysis.end:g} s of"
+            f' "{search.analysis.name}"',
             f"{name}, with required/available = {factor:.3g} at stretch = {most:.4g}. {helps}",
         )
     factor, name = search.tried[stretch]
@@ -109,7 +109,7 @@ def stretched(scene: Scene, stretch: float) -> Scene:
 
 def judging(scene: Scene) -> TimedAnalysis:
     """The first inverse analysis of a scene. Raises `InputError` where there is none, or nothing to judge by."""
-    where = f"{scene.path}: trajectory {_names(scene)}: fastest"
+    where = _where(scene)
     inverse = [one for one in scene.analysis if one.applicable and isinstance(one, TimedAnalysis)]
     if not inverse:
         raise InputError(
@@ -133,8 +133,7 @@ def _bounds(scene: Scene, analysis: TimedAnalysis) -> tuple[float, float]:
     most = 1.0 + (analysis.end - one) / (two - one)
     if most < least:
         raise InputError(
-            f'{scene.path}: trajectory {_names(scene)}: fastest: expected a path that is over before "{analysis.name}"'
-            f" ends at {analysis.end:g} s",
+            f'{_where(scene)}: expected a path that is over before "{analysis.name}" ends at {analysis.end:g} s',
             f"one that takes until {one:.4g} s",
         )
     return least, most
@@ -144,6 +143,10 @@ def _end(scene: Scene, stretch: float) -> float:
     """When the last of the paths that are to be fastest is over, s."""
     slower = (one.changed(stretch=stretch, fastest=False).path for one in scene.trajectory if one.fastest)
     return max(path.end for path in slower if path is not None)
+
+
+def _where(scene: Scene) -> str:
+    return f"{scene.path}: trajectory {_names(scene)}: fastest"
 
 
 def _names(scene: Scene) -> str:

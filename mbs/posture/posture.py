@@ -67,6 +67,11 @@ def _joints(model: Model, are: Booleans) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names[are].tolist()))
 
 
+def _owners(model: Model, *, are_paths: bool = False) -> str:
+    """Names of joints that close loops, or of trajectories."""
+    return quoted(dict.fromkeys(row.owner for row in model.rows if row.is_trajectory == are_paths))
+
+
 def paths_by_bending(model: Model, q: Array) -> tuple[int, tuple[str, ...]]:
     """Number of path equations that only bending links can meet, and the joints that loops would lock with rigid links.
 
@@ -98,10 +103,9 @@ def shape_in_redundant_loops(model: Model, q: Array, rows: Indices) -> str:
     """Why links, straight at q (n_q,), SI, cannot have a shape: equations `rows` of loops are redundant; else ""."""
     if rank_of_redundant_loops(model, q, rows) is None:
         return ""
-    owners = quoted(dict.fromkeys(row.owner for row in model.rows if not row.is_trajectory))
     return (
-        f"constraints of the loop that {owners} closes are redundant with straight links, and do not hold with bent"
-        ' ones of any shape. Use joints with more degrees of freedom, or kind = "pcid"'
+        f"constraints of the loop that {_owners(model)} closes are redundant with straight links, and do not hold with"
+        ' bent ones of any shape. Use joints with more degrees of freedom, or kind = "pcid"'
     )
 
 
@@ -136,10 +140,9 @@ def describe_branches(model: Model, times: Array, q: Array, loop_rank: int) -> s
     worst = int(ratios.argmin())
     if not ratios[worst] < BRANCHING or worst in (0, len(times) - 1):
         return ""
-    owners = quoted(dict.fromkeys(row.owner for row in model.rows if not row.is_trajectory))
     return (
-        f"at t = {times[worst]:.6g} s loops that {owners} close pass a singular posture (ratio {ratios[worst]:.1e}), in"
-        " which branches of their motion meet: links that bend may go on along another one"
+        f"at t = {times[worst]:.6g} s loops that {_owners(model)} close pass a singular posture (ratio"
+        f" {ratios[worst]:.1e}), in which branches of their motion meet: links that bend may go on along another one"
     )
 
 
@@ -150,18 +153,17 @@ def describe_loops(model: Model, t: float, q: Array, v: Array) -> str:
     if not loops.rows or before is None:
         return ""
     freedom = mobility(model, before)
-    paths = quoted(dict.fromkeys(row.owner for row in model.rows if row.is_trajectory))
     for of, rank, what, why in (
         (
             loops,
             freedom.loop_rank,
-            f"loops that {quoted(dict.fromkeys(row.owner for row in loops.rows))} close",
+            f"loops that {_owners(model)} close",
             ", or cranks and coupler in a line. No finite force determines the further motion. Avoid this posture",
         ),
         (
             model,
             freedom.loop_rank + freedom.followed,
-            f"trajectory {paths}",
+            f"trajectory {_owners(model, are_paths=True)}",
             ", where forces on the driven point do not determine the direction of motion. Keep clear of it,",
         ),
     ):
