@@ -34,7 +34,6 @@ class SolveError(FfrobotError):
     """An analysis could not be completed: the message states where, why and what to try next."""
 
     __module__ = "ffrobot"
-    exit_code = 1
 
 
 class FfrobotWarning(UserWarning):

@@ -31,11 +31,10 @@ _LENGTHS = (0.2, 5.0)
 def check_size(size: float, volume: float) -> float:
     """The number of tetrahedra of `size` (m) in `volume` (m³). Raises `InputError` above `MOST_CELLS`."""
     cubes = volume / size**3
-    side = cubes ** (1 / 3) * size
     count = 6 * 2**0.5 * cubes  # regular tetrahedra
     check_count(
         count,
-        f"{size:.3g} m for the volume of a cube of {side:.3g} m",
+        f"{size:.3g} m for the volume of a cube of {volume ** (1 / 3):.3g} m",
         ' Is it drawn in another unit (unit = "mm")?',
     )
     return count
@@ -172,8 +171,7 @@ def straightened(part: PartMesh) -> PartMesh:
     """
     if part.degree == 1:
         return part
-    points = part.points.copy()
-    shape = part.shape
+    points, shape = part.points.copy(), part.shape
     corners = len(shape.corners)
     for _ in range(20):
         determinants = _determinants(part.moved(points))

@@ -61,7 +61,6 @@ class SolidModel:
     order: int  # polynomial order of the displacements
     V: fem.FunctionSpace  # their space, three components at each node
     x: Array  # (owned, 3) nodes that this rank owns, in m
-    nodes: Integers  # (c, d) nodes of each cell, numbered as this rank sees them: its own first, ghosts behind
     materials: MaterialMap  # of the cells
     mass: ScalarMass  # scalar mass matrix
     # number of blocks in each row of the stiffness matrix: in this rank's columns and in later ranks'
@@ -149,8 +148,7 @@ def material_map(
 def solid_model(mesh: Mesh, order: int, materials: MaterialMap) -> SolidModel:
     """Space, mass matrix and stiffness form of a solid, displacements of `order`, for `stiffness_matrix`."""
     V, S = function_space(mesh, order, (3,)), function_space(mesh, order)
-    nodes = node_map(V)
-    assert np.array_equal(nodes, node_map(S)), "scalar and vector space number their nodes alike"
+    assert np.array_equal(node_map(V), node_map(S)), "scalar and vector space number their nodes alike"
     owned = V.dofmap.index_map.size_local
     a, b = ufl.TrialFunction(S), ufl.TestFunction(S)
     rho = _cellwise(mesh, materials.density, materials.of_cell)
@@ -165,7 +163,6 @@ def solid_model(mesh: Mesh, order: int, materials: MaterialMap) -> SolidModel:
         order=order,
         V=V,
         x=np.array(V.tabulate_dof_coordinates()[:owned]),
-        nodes=nodes,
         materials=materials,
         mass=ScalarMass(M),
         pattern=_pattern(M),

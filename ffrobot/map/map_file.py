@@ -51,13 +51,13 @@ def write_map(poses: PoseMap) -> Path:
         file["status"] = poses.status.reshape(plan.shape)
         file["status"].attrs["meaning"] = list(STATUS)
         file["torque_limit"], file["frequencies"] = poses.limits, plan.frequencies
-        for name, values in {**poses.values, "q": poses.q}.items():
-            file[name] = values.reshape(*plan.shape, *values.shape[1:])
-            file[name].attrs["unit"] = UNITS.get(name.rpartition("/")[2], "")
+        of_poses = {**poses.values, "q": poses.q}
+        arrays = {name: values.reshape(*plan.shape, *values.shape[1:]) for name, values in of_poses.items()}
         for condition, (turn, depth) in best_turns(poses).items():
-            for name, values in {"best_turn": turn, "best_turn_depth": depth}.items():
-                file[f"{condition}/{name}"] = values
-                file[f"{condition}/{name}"].attrs["unit"] = UNITS[name]
+            arrays |= {f"{condition}/best_turn": turn, f"{condition}/best_turn_depth": depth}
+        for name, values in arrays.items():
+            file[name] = values
+            file[name].attrs["unit"] = UNITS.get(name.rpartition("/")[2], "")
         image = image_of(file)
     write_atomically(plan.folder / FILE, sealed(image), "map", make_folder=True, ours=True)
     write_atomically(plan.folder / TABLE, _table(poses).encode(), "table of the map", ours=True)
