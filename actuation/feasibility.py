@@ -413,6 +413,5 @@ def find_unsupplied(
         about = replace(about, families=families, deflection=deflections, rotation=rotations)
     if not (motors_fit(run) and links.keys() <= run.model.tree.index.keys()):
         return about  # motors do not determine the places of points, or links are in pieces
-    followed = [path.point for path in run.model.scene.trajectory if path.point is not None]
-    points = followed or point_names(run)
+    points = run.model.scene.path_points or point_names(run)
     return _seen_at_points(about, run, find_unmet(links, patches, voltages, limited=True), points)

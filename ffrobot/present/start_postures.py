@@ -66,7 +66,7 @@ def _points(model: Model, q: Array) -> Iterator[tuple[str, str, str]]:
     """Points of paths, and tools with their orientation, in the plane by yaw alone."""
     tree, places, space = model.tree, model.tree.places(q[None]), SPACES[model.scene.space]
     tools = [tool.reference for tool in model.scene.tool]
-    for point in dict.fromkeys([*(path.point for path in model.scene.trajectory if path.point is not None), *tools]):
+    for point in dict.fromkeys([*model.scene.path_points, *tools]):
         pose = places.at(tree.section(point))
         angles = rpy_of(pose.F[0])[2 * space.is_plane :]
         turned = ", ".join(_in(angle, "rad") for angle in angles) if point in tools else ""

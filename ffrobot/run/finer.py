@@ -99,9 +99,9 @@ def _check(solution: Solution, source: Run, finer: Solution, watcher: Watcher) -
         drives=Drives(replayed=Replayed(forces, actuator_commands(finer.model, on_finer))),
         times=replay_times(source, analysis)[: len(source.time)],
     )
-    followed = [trajectory.point for trajectory in solution.scene.trajectory if trajectory.point is not None]
     bodies = {node.body.name: node.body for node in solution.model.tree.nodes}
-    points = followed or [f"{name}.{point}" for name in solution.links or bodies for point in bodies[name].points]
+    known = [f"{name}.{point}" for name in solution.links or bodies for point in bodies[name].points]
+    points = solution.scene.path_points or known
     errors = {point: _distance(source, run, point) for point in points}
     worst = max(errors, key=lambda point: errors[point])
     modes = {name: link.eigenmode_count for name, link in finer.links.items()}

@@ -118,7 +118,7 @@ class _Runs:
         self.context = replace(context, outcomes={**context.outcomes, given.name: source}, earlier=None)
         self.source, self.asked = source, asked
         self.applied = "joints+pzt" if "joints+pzt" in given.applicable else "joints"
-        followed = dict.fromkeys(path.point for path in scene.trajectory if path.point is not None)
+        followed = dict.fromkeys(scene.path_points)
         self.points = [place_of(context.whole, point) for point in followed] or [default_tip(source.model)]
         self.keys = {
             "name": "robustness",

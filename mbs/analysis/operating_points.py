@@ -170,12 +170,11 @@ def places_of(context: Context, points: Sequence[str] | None, *, loaded: bool = 
     whole = context.whole
     if points is None:
         model = context.model if whole is None else whole.model
-        followed = [path.point for path in model.scene.trajectory if path.point is not None]
         tips = [f"{node.body.name}.tip" for node in model.tree.nodes if "tip" in node.body.points]
         scene = model.scene
         carrying = [*(one.point for one in scene.payload), *(load.point for load in scene.load if load.point)]
         tools = [tool.reference for tool in scene.tool]
-        points = tuple(dict.fromkeys([*(followed or tips), *tools, *(carrying if loaded else ())]))
+        points = tuple(dict.fromkeys([*(scene.path_points or tips), *tools, *(carrying if loaded else ())]))
     return {point: place_of(whole, point) or point for point in points}
 
 

@@ -240,8 +240,7 @@ def posture_from_elsewhere(model: Model, guess: Array) -> Array:
         rounded[:, columns] = np.radians(np.round(np.degrees(np.angle(np.exp(1j * postures[:, columns])))))
         works = [q for q in rounded if len(regular_postures(model, q[None]))]
     best = min(works, key=lambda q: float(np.abs(q[columns] - guess[columns]).sum()), default=None)
-    follows = any(path.point is not None for path in scene.trajectory)  # a note then says from where
-    if best is not None and follows and not scene.initial.named("joints"):
+    if best is not None and scene.path_points and not scene.initial.named("joints"):  # a note then says from where
         q = constraints.posture(best, 0.0)
         if q is not None:
             return q

@@ -134,8 +134,7 @@ def end_points(scene: MechanismScene, points: Mapping[str, Sequence[str]]) -> It
     """
     joined = {side for joint in scene.joint for side in joint.between}
     tips = (f"{body}.tip" for body, labels in points.items() if "tip" in labels)
-    named = [tool.reference for tool in scene.tool]
-    named += [path.point for path in scene.trajectory if path.point is not None]
+    named = [*(tool.reference for tool in scene.tool), *scene.path_points]
     named += [*(tip for tip in tips if tip not in joined), *(str(load.point) for load in scene.payload)]
     known = {f"{body}.{label}" for body, labels in points.items() for label in labels}
     present = [point for point in dict.fromkeys(named) if point in known]

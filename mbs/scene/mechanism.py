@@ -167,8 +167,13 @@ class MechanismKeys(Record):
     @property
     def tool_point(self) -> str | None:
         """Point of the last path of a point, else of the last tool; None without either."""
-        points = [*(tool.reference for tool in self.tool), *(path.point for path in self.trajectory if path.point)]
+        points = [*(tool.reference for tool in self.tool), *self.path_points]
         return points[-1] if points else None
+
+    @property
+    def path_points(self) -> list[str]:
+        """Points that follow paths, one for each path of a point."""
+        return [path.point for path in self.trajectory if path.point is not None]
 
     def references(self) -> Iterator[Reference]:
         """Yield all references of the scene's records, with their full keys."""

@@ -363,7 +363,7 @@ def _far_patches(context: Context, linear: Linearisation) -> Iterator[str]:
     zeros = linear.zeros.real[[0, -1]]
     rate = float(zeros[(zeros > 0) & ~linear.is_light[[0, -1]]].min(initial=np.inf))
     model = (context.whole or context).model
-    for name in dict.fromkeys(path.point for path in model.scene.trajectory if path.point is not None):
+    for name in dict.fromkeys(model.scene.path_points):
         body, _, point = name.partition(".")
         if (of_link := context.patches.get(body)) is None or not np.isfinite(rate):
             continue
