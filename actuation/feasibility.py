@@ -289,7 +289,8 @@ def _remedies(
     count, most, missing = 0, len(patches.edges), factor
     if with_count is not None:
         missing, least = np.inf, np.abs(patches.amplifiers.range).min()
-        for number in range(patches.served, 200):
+        room = int((1.0 + 1e-6) * patches.link.length / patches.layout.length)
+        for number in range(patches.served, min(room + 1, 200)):
             if (voltage := with_count(number)) is None:
                 continue
             most, missing = number, voltage / least
