@@ -6,15 +6,6 @@ namespace ffrobot {
 
 using VectorMap = Map<const VectorXd>;
 
-namespace {
-
-constexpr int most_iterations = 12;
-constexpr double newton_share = 0.01; // of the step's tolerance that the iteration may leave
-constexpr double rounding = 1e-14;
-constexpr double slow_contraction = 0.02; // geometry is taken anew when Newton's method is slower than this
-
-} // namespace
-
 GeneralizedAlpha::GeneralizedAlpha(OdeSystem &system, double spectral_radius)
     : ImplicitMethod(system), alpha_m_((2 * spectral_radius - 1) / (spectral_radius + 1)),
       alpha_f_(spectral_radius / (spectral_radius + 1)), beta_(0.25 * std::pow(1 + alpha_f_ - alpha_m_, 2)),

@@ -44,6 +44,11 @@ protected:
            (settle(t, value_, values, move_positions) && settle(t, rate_, rates, move_velocities));
   }
 
+  static constexpr int most_iterations = 12;   // of Newton's method
+  static constexpr double newton_share = 0.01; // of the step's tolerance that the iteration may leave
+  static constexpr double rounding = 1e-14;
+  static constexpr double slow_contraction = 0.02; // geometry is taken anew when Newton's method is slower than this
+
   OdeSystem &system_;
   Index n_; // n_v: half the size of y
   VectorXd end_, start_, first_slope_, last_slope_, value_, rate_;
@@ -56,7 +61,6 @@ private:
   template <class Size, class Move>
   bool settle(double t, const VectorXd &residual, const Size &size, const Move &move) {
     constexpr double tolerance = 1e-12, rounding_floor = 1e-11;
-    constexpr int most_iterations = 12;
     double left = 0, previous = 1e300;
     for (int i = 0; i < most_iterations; ++i) {
       system_.constraint_values(t, end_.data(), value_.data(), rate_.data());

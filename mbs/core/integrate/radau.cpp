@@ -34,11 +34,7 @@ const Matrix3d A_inverse =
     Matrix3d{{mu_real, 0, 0}, {0, mu_complex.real(), -mu_complex.imag()}, {0, mu_complex.imag(), mu_complex.real()}} *
     T_inverse;
 
-constexpr int most_iterations = 12;
-constexpr double newton_share = 0.01; // of the step's tolerance that the iteration may leave
-constexpr double noise_share = 1;     // the same where only noise is left, which differs from step to step
-constexpr double rounding = 1e-14;
-constexpr double slow_contraction = 0.02; // geometry is taken anew when Newton's method is slower than this
+constexpr double noise_share = 1; // newton_share where only noise is left, which differs from step to step
 
 } // namespace
 
