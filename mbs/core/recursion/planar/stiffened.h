@@ -1,6 +1,4 @@
-// What geometric stiffening changes of a planar body: its inertia, rows and forces are those of the linear body, less
-// what affine fields have of them there, and what they have with terms of second order (stiffening.h). The mass matrix
-// of the modes is then no longer 1: products of rows are W m_ff^-1 W^T, found at every evaluation with m_ff = L D L^T.
+// What geometric stiffening changes of a planar body, as spatial/stiffened.h has it of one in space.
 #pragma once
 
 #include "core/recursion/planar/body.h"

@@ -6,13 +6,7 @@ namespace ffrobot::recursion::planar {
 
 namespace {
 
-// What of K of its markers is nothing but rounding
-double negligible_K(const PlanarData &data) {
-  double largest = largest_of({data.K[0], data.K[1]}) / data.mass; // the mean of all points
-  for (const PlanarMarker &marker : data.markers)
-    largest = std::max(largest, largest_of(marker.K));
-  return negligible * largest;
-}
+double negligible_K(const PlanarData &data) { return negligible_of(data, {data.K[0], data.K[1]}); }
 
 // Products with x, y, x x + y y and x y - y x of what is given about `center` instead of the origin
 template <class X> void move(const Vector2d &center, std::array<X, fields> &products) {
@@ -24,9 +18,8 @@ template <class X> void move(const Vector2d &center, std::array<X, fields> &prod
 
 std::vector<MatrixXd> turned(const Matrix2d &R, const std::vector<MatrixXd> &y) {
   std::vector<MatrixXd> x = y;
-  for (std::size_t k = 0; k < 2 && !y.empty(); ++k) {
+  for (std::size_t k = 0; k < 2 && !y.empty(); ++k)
     x[k] = R(k, 0) * y[0] + R(k, 1) * y[1];
-  }
   return x;
 }
 

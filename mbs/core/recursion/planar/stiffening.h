@@ -1,15 +1,10 @@
-// Constants of a planar body with geometric stiffening. To second order its points are, in its frame, at
-//
-//     r(x) = x + Phi(x) p - 1/2 p^T G(x) p
-//
-// In the inertia (not at markers) the second-order field is replaced by its mass-weighted projection on four affine
-// fields: translations along x and y, stretch and turn about the center of mass, each of norm 1 under the mass, so that
-// they are orthonormal. What Phi p has beside these stays as in the linear body. The kinetic energy is then a sum of
-// squares, so that M is positive definite however far the body is bent (the same in space: spatial/stiffening.h).
+// Constants of a planar body with geometric stiffening, as spatial/stiffening.h has them of one in space. Here the
+// affine fields are four: translations along x and y, stretch and turn about the center of mass, each of norm 1 under
+// the mass, so that they are orthonormal.
 //
 // Products of the fields with the modes, with G, and with the position of the undeformed body:
 //     F (4, n)     K (4, n, n)     g (4)
-// Then F(p) = F - K p are their products with the modes of the bent body, and
+// and, with F(p) = F - K p, of the bent body:
 //     g(p) = g + F p - 1/2 p^T K p,     s = (g_0, g_1) sqrt(m),     m_ff = 1 - F^T F + F(p)^T F(p)
 #pragma once
 

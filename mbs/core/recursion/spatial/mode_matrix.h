@@ -92,6 +92,14 @@ struct ModeMatrix {
 
 double largest_of(const std::vector<MatrixXd> &all); // entry of these, 0 of none
 
+// What of K of a body's markers is nothing but rounding; K_s: its integral over the mass
+template <class Data> double negligible_of(const Data &data, const std::vector<MatrixXd> &K_s) {
+  double largest = largest_of(K_s) / data.mass; // the mean of all points
+  for (const auto &marker : data.markers)
+    largest = std::max(largest, largest_of(marker.K));
+  return negligible * largest;
+}
+
 // Stiffness and damping of the modes of a body, which has K, D, is_damped and, for what is no diagonal, D_full
 template <class Data, class Body> void take_damping(const Data &data, Body &body) {
   const MatrixXd &D = data.damping;

@@ -45,12 +45,7 @@ template <class X> std::vector<X> by_fields(const Orthonormal &fields, const std
 
 } // namespace
 
-double negligible_K(const SpatialData &data) {
-  double largest = largest_of(data.K_s) / data.mass; // the mean of all points
-  for (const SpatialMarker &marker : data.markers)
-    largest = std::max(largest, largest_of(marker.K));
-  return negligible * largest;
-}
+double negligible_K(const SpatialData &data) { return negligible_of(data, data.K_s); }
 
 Stiffening::Stiffening(const SpatialData &data, const std::vector<int> &used) {
   project(data);
@@ -70,17 +65,15 @@ void Stiffening::project(const SpatialData &data) {
     std::array<MatrixXd, 4> with_G;
     with_modes[0] = data.S_bar.row(c), with_G[0] = data.K_s[c];
     for (int k = 0; k < 3; ++k) {
-      const std::size_t slot = 3 * k + c;
-      with_modes[slot / 3 + 1] =
-          data.I_bar.size() ? RowVectorXd(data.I_bar.row(3 * k + c)) : RowVectorXd(RowVectorXd::Zero(n));
-      with_G[slot / 3 + 1] = data.K_x[slot];
+      const int slot = 3 * k + c;
+      with_modes[k + 1] = data.I_bar.size() ? RowVectorXd(data.I_bar.row(slot)) : RowVectorXd(RowVectorXd::Zero(n));
+      with_G[k + 1] = data.K_x[slot];
     }
     const auto F_c = by_fields(orthonormal_fields, with_modes);
     const auto K_c = by_fields(orthonormal_fields, with_G);
     for (int f = 0; f < fields; ++f) {
       g[c][f] = orthonormal_fields.L(1 + c, f);
-      for (Index j = 0; j < n; ++j)
-        F[(c * fields + f) * stride + j] = F_c[f][j];
+      std::copy_n(F_c[f].data(), n, F.begin() + (c * fields + f) * stride);
       all_K.push_back(K_c[f]);
     }
   }
@@ -93,9 +86,7 @@ void Stiffening::project(const SpatialData &data) {
       rest -= F_i * F_i.transpose();
   }
   m_ff_rest.assign(n * stride, 0.0);
-  for (Index i = 0; i < n; ++i)
-    for (Index j = 0; j < n; ++j)
-      m_ff_rest[i * stride + j] = rest(i, j);
+  Map<MatrixXd>(m_ff_rest.data(), stride, n).topRows(n) = rest; // symmetric
 }
 
 void Stiffening::fill_ports(const SpatialData &data, const std::vector<int> &used) {

@@ -4,8 +4,7 @@
 //
 // In the inertia (not at markers) the second-order field is replaced by its mass-weighted projection on affine fields,
 // the products of 1, x, y, z with the three axes; what Phi p has beside these stays as in the linear body. The kinetic
-// energy is then a sum of squares, so that M is positive definite however far the body is bent (the same in the plane:
-// planar/stiffening.h).
+// energy is then a sum of squares, so that M is positive definite however far the body is bent.
 //
 // Scalar fields phi_f, combinations of 1, x, y, z that are orthonormal under the mass; a line of mass has two of them.
 // By axis c and field f, products with the modes, with G, and with the position of the undeformed body:
