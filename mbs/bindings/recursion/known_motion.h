@@ -20,11 +20,10 @@ void at_known_states(Model<Space> &model, const Scene &scene, const KnownStates 
   const auto &[times, q, v, a] = states;
   const Index count = times.size();
   check_scene(model, scene);
-  const Index columns[] = {model.mechanism.n_q, model.mechanism.n_v, model.mechanism.n_v};
-  for (const int k : {0, 1, 2}) {
-    const Rows &of = k == 0 ? q : k == 1 ? v : a;
-    check_size("states", of.rows(), count), check_size("coordinates", of.cols(), columns[k]);
-  }
+  const auto check = [&](const Rows &of, Index columns) {
+    check_size("states", of.rows(), count), check_size("coordinates", of.cols(), columns);
+  };
+  check(q, model.mechanism.n_q), check(v, model.mechanism.n_v), check(a, model.mechanism.n_v);
   if (count == 0)
     return;
   const nb::gil_scoped_release unlocked;

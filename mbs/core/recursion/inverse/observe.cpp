@@ -25,16 +25,15 @@ std::pair<Vector3d, Vector3d> parts(const spatial::State<double> &s) { return {v
 // Of one body: s and M_rr of the frame (translation, rotation; body axes), m p_dot (linear, angular), 1/2 p_dot^T m_ff
 // p_dot
 struct Inertia {
-  double mass;
-  Vector3d s, S_p_dot, h_p_dot;
-  Matrix3d J;
-  double modal;
+  double mass, modal;
+  Vector3d s = Vector3d::Zero(), S_p_dot = s, h_p_dot = s;
+  Matrix3d J = Matrix3d::Zero();
 };
 
 double half_square(int n, const double *v) { return 0.5 * Map<const VectorXd>(v, n).squaredNorm(); }
 
 Inertia inertia_of(const planar::Body &b, const double *p, const double *v, planar::State<double> &s) {
-  Inertia to{b.mass, Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), Matrix3d::Zero(), half_square(b.n, v)};
+  Inertia to{b.mass, half_square(b.n, v)};
   forces_on_rows(b, p, v, s);
   to.s << b.sx, b.sy, 0;
   to.J(2, 2) = b.J;
@@ -50,7 +49,7 @@ Inertia inertia_of(const planar::Body &b, const double *p, const double *v, plan
 }
 
 Inertia inertia_of(const spatial::Body &b, const double *, const double *v, spatial::State<double> &s) {
-  Inertia to{b.mass, Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), Matrix3d::Zero(), half_square(b.n, v)};
+  Inertia to{b.mass, half_square(b.n, v)};
   Pack<double, 6> M[6];
   double bias[6];
   spatial::FrameTerms<double> frame(M, bias);

@@ -106,7 +106,7 @@ void NewtonEuler<Space>::accelerate(const double *q, const double *a, const Work
     hinge.turn.back((node.parent < 0 ? ground : ports_[node.parent_port]).data(), A.data());
     if (node.rotor_inertia > 0)
       rotor_[i] = node.rotor_inertia * (node.rotor_turns * A[Space::axis] + node.gear_ratio * a[node.v]);
-    std::remove_cvref_t<decltype(hinge.turn)>::shift(hinge.r, A.data());
+    hinge.turn.shift(hinge.r, A.data());
     add(acceleration_of_joint(node, hinge, q + node.q, a + node.v), A);
     for (std::size_t k = 0; k < A.size(); ++k)
       A[k] += hinge.c[k];
@@ -165,7 +165,7 @@ template <class Space> void NewtonEuler<Space>::transmit(const Workspace<Space, 
     if (node.inboard >= 0)
       inboard_tilt(node, s).back(f.data(), of_joint_[i].data());
     Vector on_inner = of_joint_[i], turned;
-    std::remove_cvref_t<decltype(hinge.turn)>::add_moment(hinge.r, on_inner.data());
+    hinge.turn.add_moment(hinge.r, on_inner.data());
     if (with_inertia && node.rotor_inertia > 0) {
       Vector moment{}, at_section;
       moment[Space::axis] = node.rotor_turns * rotor_[i];
@@ -316,7 +316,7 @@ template <class Space> VectorXd NewtonEuler<Space>::on_body(std::size_t i, const
   for (std::size_t k = 0; k < mechanism_.nodes.size(); ++k)
     if (const Node<Space> &outer = mechanism_.nodes[k]; outer.parent == static_cast<int>(i)) {
       Vector on_inner = loads_along_joint(k), turned;
-      std::remove_cvref_t<decltype(w.hinges[k].turn)>::add_moment(w.hinges[k].r, on_inner.data());
+      w.hinges[k].turn.add_moment(w.hinges[k].r, on_inner.data());
       w.hinges[k].turn.apply(on_inner.data(), turned.data());
       add(turned, at_ports[outer.parent_port - node.first_port], -1);
     }
