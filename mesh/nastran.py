@@ -75,8 +75,7 @@ def cards(path: Path) -> Iterator[Card]:
             continue
         before = k - 1
         if row.begin and (k == 0 or rows[before].end != row.begin):
-            by_mark = ends.get(row.begin)
-            before = before if by_mark is None and k and not rows[before].end else -1 if by_mark is None else by_mark
+            before = ends.get(row.begin, before if k and not rows[before].end else -1)
         if before < 0 or before in after:
             raise InputError(f"expected one card (GRID …) that {row.place} continues", "none or several")
         after[before] = k

@@ -34,9 +34,7 @@ def weights(offsets: Array) -> Array:
     """Return weights w (n,), 1/unit of x, of f'(0) ≈ Σ w_i f(x_i) at `offsets` x (n,): exact for degrees below n."""
     size = np.abs(offsets).max()
     powers = np.vander(offsets / size, increasing=True).T
-    first = np.zeros(len(offsets))
-    first[1] = 1.0
-    return np.linalg.solve(powers, first) / size
+    return np.linalg.solve(powers, np.eye(len(offsets))[1]) / size
 
 
 def derivative(offsets: Array, values: Array) -> Derivative:

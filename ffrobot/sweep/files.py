@@ -170,7 +170,7 @@ def _near(data: Node, key: tuple[str, ...]) -> str:
             return did_you_mean(part, data)
         if not isinstance(data, dict | list):
             return ""
-        data = data[_index(data, part, key)]  # type: ignore[index]
+        data = data[_index(data, part, key)]
     return ""
 
 
@@ -228,7 +228,7 @@ def value_of(data: Node, key: tuple[str, ...], whole: tuple[str, ...] = (), opti
     for part in key:
         if not isinstance(value, dict | list) or (isinstance(value, dict) and part not in value):
             return None
-        value = value[_index(value, part, whole or key, option)]  # type: ignore[index]
+        value = value[_index(value, part, whole or key, option)]
     return value
 
 
@@ -241,15 +241,16 @@ def set_key(data: Node, key: tuple[str, ...], value: Value, whole: tuple[str, ..
     for part in key[:-1]:
         if isinstance(data, dict):
             data.setdefault(part, {})
-        inner = data[_index(data, part, whole)]  # type: ignore[index]
+        inner = data[_index(data, part, whole)]
         if not isinstance(inner, dict | list):
             raise InputError(f'--vary: expected a table or a list at "{part}" of "{".".join(whole)}"', f"{inner!r}")
         data = inner
-    data[last := _index(data, key[-1], whole)] = value  # type: ignore[index]
+    data[last := _index(data, key[-1], whole)] = value
     return id(data), last
 
 
-def _index(data: Node, part: str, whole: tuple[str, ...], option: str = "--vary") -> str | int:
+def _index(data: Node, part: str, whole: tuple[str, ...], option: str = "--vary") -> Any:
+    """The key of a table, or the number in a list."""
     if isinstance(data, dict):
         return part
     names = [str(one.get("name", one.get("body", k))) for k, one in enumerate(data) if isinstance(one, dict)]

@@ -64,7 +64,7 @@ def _name_of(function: object) -> str:
     return str(getattr(function, "__qualname__", function))
 
 
-def check_domain(function: TimeFunction, times: Array, describe: str, derivatives: int = 2) -> None:
+def check_domain(function: TimeFunction, times: Array, describe: str, derivatives: int) -> None:
     """Raise `InputError` unless `function` and its first `derivatives` time derivatives exist at all `times` (T,), s.
 
     The message starts with `describe` (file and key) and has the first time with a domain error or an overflow, or
