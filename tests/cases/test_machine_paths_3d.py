@@ -225,7 +225,7 @@ def test_mistakes_in_places_are_told(via, keys, told):
     ],
 )
 def test_mistakes_with_motors_are_told(change, told):
-    joint = {"stiffness": 400.0, "rotor_inertia": 2e-5} | change.get("joint", {})
+    joint = change.get("joint", {"stiffness": 400.0, "rotor_inertia": 2e-5})
     scene_keys = change.get("analysis", {})
     with pytest.raises(InputError, match=told):
         ffrobot.solve(arm({"motor": "shoulder", "duration": 0.2} | change.get("path", {}), joint, **scene_keys))

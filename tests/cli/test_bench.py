@@ -100,10 +100,7 @@ MISTAKES = {
     "analysis at rest": (["--analysis", "held"], f'scene.toml: analysis "held": {INTEGRATES} kind = "static"'),
     "unknown integrator": (["--integrators", "dop583"], 'found "dop583" (did you mean "dop853"?)'),
     "tolerance": (["--tolerances", "1e-3,2"], "--tolerances: expected numbers from 1e-10 to below 1, found 2"),
-    "output": (
-        ["-o", "arm.toml"],
-        "arm.toml: output: expected another file than the input arm.toml, which would be lost",
-    ),
+    "output": (["-o", "arm.toml"], "arm.toml: output: expected a folder, found a file"),
 }
 
 
