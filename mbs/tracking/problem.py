@@ -163,9 +163,12 @@ def settled(asked: Transition, breaks: Array, to: float = SETTLED) -> Tracked:
             break
         calmer, is_settled = _descend(asked, halved(breaks), calm, to)
         best = min(best, calmer, key=lambda one: one.share if one.converged else np.inf)
-    best = best if best.converged else track(asked, breaks)
-    unmet = _left_over(asked, best, 1.0)[0] if best.converged else np.inf
-    return replace(best, unmet=unmet, converged=unmet <= LOST)
+    return best if best.converged else _judged(asked, track(asked, breaks))
+
+
+def _judged(asked: Transition, tracked: Tracked) -> Tracked:
+    unmet = _left_over(asked, tracked, 1.0)[0] if tracked.converged else np.inf
+    return replace(tracked, unmet=unmet, converged=unmet <= LOST)
 
 
 def _descend(asked: Transition, breaks: Array, calm: float, to: float) -> tuple[Tracked, bool]:
@@ -189,4 +192,5 @@ def _descend(asked: Transition, breaks: Array, calm: float, to: float) -> tuple[
         tracked = replace(finer, doubt=2 * change + finer.added / least)
     if change <= to:
         tracked = replace(track(asked, breaks, tracked, calm), doubt=tracked.doubt)
+    tracked = _judged(asked, tracked)
     return tracked, tracked.converged and change <= to
