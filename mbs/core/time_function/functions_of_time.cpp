@@ -87,7 +87,7 @@ void FunctionsOfTime::evaluate(const Part &part) {
     to = integer_power(x, part.power);
   else if (op == Op::sin)
     sine_and_cosine(z, to, values_[part.value + 1]);
-  else if (is_simple(op))
+  else if (op < Op::power || op == Op::negate || op >= Op::less)
     to = apply_simple(op, x, values_[part.operands[1]], z);
   else
     for (std::size_t i = 0; i < together; ++i)

@@ -129,10 +129,7 @@ template <class T>
   return {of(a.value, b.value), of(a.rate, b.rate), of(a.acceleration, b.acceleration)};
 }
 
-/// Whether `apply_simple` has it: arithmetic, comparisons and logic, which work on numbers side by side, too
-inline bool is_simple(Op op) { return op < Op::power || op == Op::negate || op >= Op::less; }
-
-// Of an instruction with operands: of one z, of two x and z, of three x, y and z
+// Of arithmetic, comparisons and logic, which take numbers side by side, too: operands are z, x and z, or x, y and z
 template <class T>
 [[gnu::always_inline]] inline JetOf<T> apply_simple(Op op, const JetOf<T> &x, const JetOf<T> &y, const JetOf<T> &z) {
   switch (op) {
@@ -165,7 +162,7 @@ template <class T>
   }
 }
 
-// Likewise, of any instruction
+// Of any instruction, with the same operands
 [[gnu::always_inline]] inline Jet apply(const Expression::Instruction &i, const Jet &x, const Jet &y, const Jet &z) {
   if (i.takes_constant)
     return apply_constant(i.op, z, i.constant);
