@@ -62,7 +62,7 @@ class BeamFlexibility:
 def attachment_modes(
     model: FamilyModel, family: Family, X: Array, places: Sequence[int], length: float, twists_along: bool
 ) -> list[Mode]:
-    """Attachment modes of a family, M-orthogonal to its eigenmodes X (m, n), XᵀMX = I, in the modal body.
+    """Attachment modes of a family, M-orthogonal to its eigenmodes X (m, n), SI, in the modal body.
 
     `places` are the stations of the interfaces, `length` (m) is that of the link: loads are unit forces, and moments
     of 1 N times it. `twists_along`: whether to add a torque distributed along the link, as on bent links.
@@ -100,7 +100,7 @@ def ritz_modes(model: FamilyModel, family: Family, fixed: Array, static: Array) 
 def lowest_modes(
     model: FamilyModel, count: int, flexibility: FixedInterfaceFlexibility | BeamFlexibility | None = None
 ) -> tuple[Array, Array]:
-    """The `count` lowest eigenpairs of K x = ω² M x: ω² (count,) ascending in rad²/s², X (m, count) with Xᵀ M X = I.
+    """The `count` lowest eigenpairs of K x = ω² M x: ω² (count,) ascending, rad²/s², X (m, count), SI, Xᵀ M X = I.
 
     `flexibility`: K⁻¹, or that with fixed interfaces. Raises `SolveError` where round-off errors spoil the modes.
     """

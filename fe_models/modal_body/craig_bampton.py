@@ -153,7 +153,7 @@ class CraigBampton:
 
 
 def craig_bampton(body: ModalBody) -> CraigBampton:
-    """Craig–Bampton matrices of a body with this reference condition, exactly from its invariants."""
+    """Craig–Bampton matrices of a body with interface modes, exactly from its invariants."""
     omega2 = np.diag(body.stiffness)
     static = body.mode_count - body.eigenmode_count
     coordinates = interface_coordinates(omega2, body.family, static, body.interfaces)

@@ -263,7 +263,7 @@ class AnalysisResult:
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Properties of correct results, a text each."""
+        """Remarks that are no warnings, a text each."""
         model = self.run.model
         texts: tuple[str, ...] = () if self.sharing is None else (self.sharing.in_words,)
         if self._is_integrated:

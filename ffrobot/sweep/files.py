@@ -146,7 +146,7 @@ def number_at(path: Path, key: tuple[str, ...], option: str, kind: str = "scene 
 
 
 def number_of(tables: Table, key: tuple[str, ...], label: str, whole: tuple[str, ...] = ()) -> float:
-    """Return the number at `key` of `tables`. Raises `InputError` without one: `label` first, `whole` for the key."""
+    """Return the number at `key` of `tables`. Raises `InputError`: `label` begins it, `whole` names the key."""
     value = value_of(tables, key, whole, label)
     if isinstance(value, bool) or not isinstance(value, int | float):
         text = "none" if value is None else repr(value)

@@ -101,7 +101,7 @@ class Recovery:
 
 
 def mode_displacement(p: Array) -> Recovery:
-    """The recovery from modal coordinates p (T, n), √kg·m, of the file alone."""
+    """The recovery from modal coordinates p (T, n), √kg·m, of the file: no loads."""
     return Recovery(METHODS[0], p, (), np.zeros((len(p), 0)))
 
 
