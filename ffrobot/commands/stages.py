@@ -140,9 +140,9 @@ def solve(
 def _tell(solution: "Solution", path: Path, remarked: int) -> None:
     """Print the summary, or the details; `remarked`: lines that stand above it."""
     from ..present.console import summary_console, summary_width
-    from ..present.lines import error_budget, tables_of
+    from ..present.lines import tables_of
     from ..present.start_postures import chosen_posture
-    from ..present.summary import summary_lines
+    from ..present.summary import error_budget, summary_lines
     from ..results.file import Results
     from ..results.tables import robustness_cells
 

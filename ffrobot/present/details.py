@@ -22,7 +22,8 @@ from ..mbs.run.record import Details, Run
 from ..results.file import Results
 from ..results.tables import Cells, analysis_cells, loop_cells, placement_cells, settling_cells, voltage_cells
 from ..run.result import AnalysisResult, ModeChoice, Solution
-from .lines import alike, error_budget, folded, integrated, named_tables, tables_of
+from .lines import alike, folded, named_tables, tables_of
+from .summary import error_budget, integrated
 
 OF_FILE = ("status", "outputs", "rejected")  # of analyses: for the table of a report alone
 

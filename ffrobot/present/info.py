@@ -19,6 +19,7 @@ from ..fe_models.modal_body_file import FORMAT as MODAL_FORMAT
 from ..fe_models.modal_body_file import read_modal_body
 from ..results.file import FORMAT as RESULTS_FORMAT
 from ..results.file import Results, status_in_words
+from .lines import print_table, tables_of
 
 if TYPE_CHECKING:
     from ..mesh.inspection import Inspection
@@ -100,7 +101,6 @@ def _optional(body: ModalBody) -> Iterator[str]:
 
 def _results(results: Results) -> str:
     from ..results.tables import loop_cells  # loads the records of scenes
-    from .lines import tables_of
 
     lines = [
         f"results of scene {results.name!r}, made by ffrobot {results.ffrobot_version}",
@@ -132,8 +132,6 @@ def _rendered(table: Table) -> str:
 
 def print_inspection(file: Path, part: "Inspection", density: float | None, console: Console) -> None:
     """Print unit, extent, volume, mass if `density` (kg/m³) is known, and a table of faces, largest first."""
-    from .lines import print_table  # loads the core
-
     said = "" if part.is_declared else ", a guess by its size: --unit sets it"
     size = " × ".join(f"{1000 * value:.6g}" for value in part.high - part.low)
     mass = "" if density is None else f"; mass {density * part.volume:.6g} kg with {density:g} kg/m³"

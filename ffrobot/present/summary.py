@@ -4,7 +4,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
+from ..mbs.quantities.attachment_error import JOLT
+from ..mbs.quantities.validity import largest
 from ..results.verdict import ROUND_OFF, AnalysisVerdict, Verdict, millimeters, motor_texts
+from ..run.result import AnalysisResult, Solution
 from .lines import alike, folded
 
 if TYPE_CHECKING:
@@ -170,3 +173,52 @@ def _length(value: float | None) -> str:
 
 def _percent(factor: float) -> str:
     return f"{100 * factor if factor > ROUND_OFF else 0:.3g} %" if factor < 10.0 else f"{factor:.3g} ×"
+
+
+NOT_ESTIMATED = "not estimated"
+RESOLVED = 0.3  # largest meaningful estimated error of modes
+
+
+def error_budget(solution: Solution) -> Iterator[str]:
+    """Yield a line on each estimated error: time integration, modes, linear deflection, patches."""
+    results, analyses = integrated(solution), solution.analyses
+    if aims := [result.analysis.tolerance for result in results]:
+        asked = " … ".join(f"{aim:.0e}" for aim in sorted({min(aims), max(aims)}))
+        yield f"time integration: {asked} of peaks, requested tolerance"
+    yield f"modes: {_modes(solution, results)}"
+    text, worst = "links are rigid", [most for one in analyses.values() if (most := largest(one.bending)) is not None]
+    if worst:
+        name, link = max(worst, key=lambda item: (item[1].is_beyond, item[1].missing.of_length))
+        text = "not small: see the warning" if link.is_beyond else f"{name} {link.in_words}: {link.estimate}"
+    yield f"deflection: {text}"
+    for name, result in analyses.items():
+        if result.check is not None:
+            yield f"{name}, {result.check.in_words}"
+    layouts = (array for of_link in solution.patches.values() for array in of_link.arrays.values())
+    yield from (f"patches of {array.stiffness_in_words}" for array in layouts)
+
+
+def integrated(solution: Solution) -> list[AnalysisResult]:
+    """Return results of the analyses that integrate over time."""
+    return [result for result in solution.analyses.values() if result.analysis.is_integrated]
+
+
+def _modes(solution: Solution, results: Sequence[AnalysisResult]) -> str:
+    if rigid := [f"{name} in {', '.join(body.rigid_in)}" for name, body in solution.bodies.items() if body.rigid_in]:
+        return f"{NOT_ESTIMATED}: rigid without modes: {'; '.join(rigid)}"
+    if not solution.links:
+        return "links are rigid"
+    if solution.mode_choice is not None:
+        known = [error for of in solution.mode_choice.errors.values() for error in of.values()]
+        return f"{max(known):.0e} of peaks, against all modes of the files" if any(known) else NOT_ESTIMATED
+    errors = [result.mode_error for result in results]
+    known = [error for error in errors if error is not None]
+    if not known or len(known) < len(errors):
+        without = [name for name, link in solution.links.items() if not link.residual.any()]
+        return f"{NOT_ESTIMATED}: no attachment modes in {', '.join(without)}" if without else NOT_ESTIMATED
+    estimate = f"{max(known):.0e} of peaks, estimated"
+    if max(known) > RESOLVED:
+        estimate = "too few: vibrations above the highest mode are excited"
+    if any(result.start_jolt >= JOLT for result in results):
+        estimate += "; a start in equilibrium, without a step in acceleration, lowers it"
+    return estimate
