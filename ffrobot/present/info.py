@@ -106,7 +106,8 @@ def _results(results: Results) -> str:
         f"results of scene {results.name!r}, made by ffrobot {results.ffrobot_version}",
         *(f"body {name}: {body.path} (sha256 {body.sha256[:12]})" for name, body in results.modal_files.items()),
     ]
-    analyses = Table("analysis", "kind", "status", "outputs", "up to t (s)", "steps", "evaluations", "wall (s)")
+    headers = "analysis", "kind", "status", "outputs", "up to t (s)", "steps", "evaluations", "wall (s)"
+    analyses = Table(*headers)
     for name in results.analyses:
         time, about = results.time(name), results.attributes(name)
         effort = (str(about["steps"]), str(about["evaluations"]), f"{about['wall_seconds']:.3f}")
