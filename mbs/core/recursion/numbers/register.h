@@ -76,9 +76,9 @@ struct Register<n> {
     if constexpr (n == 2)
       return v[0] + v[1];
     else if constexpr (n == 4)
-      return (Register<2>{{v[0], v[1]}} + Register<2>{{v[2], v[3]}}).sum();
+      return (Register<n / 2>{{v[0], v[1]}} + Register<n / 2>{{v[2], v[3]}}).sum();
     else
-      return (Register<4>{{v[0], v[1], v[2], v[3]}} + Register<4>{{v[4], v[5], v[6], v[7]}}).sum();
+      return (Register<n / 2>{{v[0], v[1], v[2], v[3]}} + Register<n / 2>{{v[4], v[5], v[6], v[7]}}).sum();
   }
   FFROBOT_INLINE Register &operator+=(const Register &o) { return v += o.v, *this; }
   FFROBOT_INLINE Register &operator-=(const Register &o) { return v -= o.v, *this; }
