@@ -20,7 +20,7 @@ from ..mbs._core import TimeFunction
 from ..mbs.fields.field_types import GROUND
 from ..mbs.fields.functions import check_derivatives, check_domain
 from ..mbs.fields.spelling import PLANAR, SPATIAL
-from ..mbs.joints.joint import JointRecord
+from ..mbs.joints.joint import JointRecord, coordinate_names
 from ..mbs.scene.analysis import Analysis, Surroundings
 from ..mbs.scene.bodies import BodyKeys
 from ..mbs.scene.mechanism import in_3d
@@ -228,11 +228,7 @@ def _reference_problems(scene: SceneKeys) -> Iterator[str]:
     patched = list(dict.fromkeys(layout.body for layout in scene.pzt))
     layouts = [layout.label for layout in scene.pzt]
     axes = tuple(f"/{'xyz'[k]}" for k in SPACES[scene.space].translations)
-    commands = [
-        f"joint/{joint.name}" + (f" {k + 1}" if len(joint.units) > 1 else "")
-        for joint in scene.motor_joints
-        for k in range(len(joint.units))
-    ]
+    commands = [name for joint in scene.motor_joints for name in coordinate_names(joint.name, len(joint.units))]
     commands += [f"pzt/{of.label}/{k + 1}" for of in scene.pzt if of.is_driven for k in range(of.patch_count)]
     for reference in scene.references():
         key, name = reference.key, reference.name

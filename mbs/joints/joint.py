@@ -140,6 +140,11 @@ class LoopEquation(NamedTuple):
     g: int = 0
 
 
+def coordinate_names(joint: str, count: int) -> list[str]:
+    """Names of the `count` coordinates of a joint: "joint/NAME", or "joint/NAME 1", … of several."""
+    return [f"joint/{joint}" + (f" {number}" if count > 1 else "") for number in range(1, count + 1)]
+
+
 class Along(NamedTuple):
     """A coordinate of a joint that closes a loop; axes 0, 1, 2 of the inner triad, or of the outer one if `of_outer`.
 

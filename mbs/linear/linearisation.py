@@ -16,6 +16,7 @@ from ...common.errors import InputError, SolveError
 from ...common.libraries import scipy
 from ...common.rotations import skew
 from ...common.structs import struct
+from ..joints.joint import coordinate_names
 from ..model.gears import gear_matrices
 from ..model.known_motion import KnownStates, required_forces
 from ..model.model import Model
@@ -154,7 +155,7 @@ class LinearEquations:
         inputs = {}
         for joint, columns in self.model.motors.items():
             beside = shares[joint].direction @ H if joint in shares else 0.0
-            for name, k in zip(_names(joint, len(columns)), columns, strict=True):
+            for name, k in zip(coordinate_names(joint, len(columns)), columns, strict=True):
                 inputs[name] = self.model.sign(joint) * (H[k] + beside)
         return inputs | self._along_axes("force", points)
 
@@ -168,7 +169,7 @@ class LinearEquations:
         gradients = self.model.along_cut.measured(state.q)[1][0]
         for cut in tree.cut_joints:
             own = [G @ H for one, G in zip(self.model.cut, gradients, strict=True) if one.joint is cut]
-            rows |= dict(zip(_names(cut.name, len(own)), own, strict=True))
+            rows |= dict(zip(coordinate_names(cut.name, len(own)), own, strict=True))
         rows |= {f"motor/{gear.joint.joint.name}": H[gear.motor.v.start] for gear in tree.gears}
         return rows | self._along_axes("point", points)
 
@@ -193,11 +194,7 @@ class LinearEquations:
 def labelled(model: Model, joint: str) -> Iterator[tuple[str, int]]:
     """Yield the name of each coordinate of a joint, "joint/NAME" or "joint/NAME 1", …, and its number in v."""
     columns = model.columns(joint)
-    yield from zip(_names(joint, len(columns)), map(int, columns), strict=True)
-
-
-def _names(joint: str, count: int) -> list[str]:
-    return [f"joint/{joint}" + (f" {number}" if count > 1 else "") for number in range(1, count + 1)]
+    yield from zip(coordinate_names(joint, len(columns)), map(int, columns), strict=True)
 
 
 def _coordinates(model: Model) -> tuple[list[str], Array]:
